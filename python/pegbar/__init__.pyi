@@ -1,0 +1,10 @@
+from .errors import DegenerateError as DegenerateError
+from .errors import FormatError as FormatError
+from .errors import MissingFrameError as MissingFrameError
+from .errors import PegbarError as PegbarError
+from .errors import ShotError as ShotError
+from .layer.depth import limb_depth as limb_depth
+from .scene.camera import PerspectiveCamera as PerspectiveCamera
+from .scene.drawing import Drawing as Drawing
+from .scene.drawing import Limb as Limb
+from .scene.motion import Motion as Motion

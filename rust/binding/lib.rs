@@ -1,0 +1,14 @@
+//! `pegbar._kernels`: registers the wrappers; each file carries its kernel's name.
+
+mod arrays;
+mod depth;
+mod errors;
+
+use pyo3::prelude::*;
+
+/// The Rust kernels of pegbar. Strict and private: call the functions of the `pegbar` package instead.
+#[pymodule(gil_used = false)]
+mod _kernels {
+    #[pymodule_export]
+    use crate::depth::limb_depth;
+}

@@ -1,0 +1,139 @@
+//! Depth of every drawn pixel from the depths of its limb's two ends.
+//!
+//! Jain, Sheikh, Mahler, Hodgins 2010, section 3.3.1: a pixel has the depth of the closest point of its limb's axis,
+//! the segment between the limb's two markers. Assumes labels 0 (no limb) or v + 1 (limb v).
+
+use crate::error::{KernelError, check_length};
+use glam::DVec2;
+use rayon::prelude::*;
+
+/// How depth runs from one end of a limb to the other, along the drawn segment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Interpolation {
+    /// Linear in pixels, as the paper says.
+    Linear,
+    /// Linear in 1/z: a straight limb under a perspective camera.
+    Perspective,
+}
+
+/// One limb made ready for its pixels: the parameter along the axis is affine in the pixel's place.
+#[derive(Clone, Copy)]
+struct Axis {
+    origin: DVec2,
+    step: DVec2,
+    from: f64,
+    change: f64,
+    reciprocal: bool,
+}
+
+impl Axis {
+    fn new(a: DVec2, b: DVec2, za: f64, zb: f64, interpolation: Interpolation) -> Self {
+        let along = b - a;
+        let squared = along.length_squared();
+        let reciprocal = interpolation == Interpolation::Perspective;
+        // A limb seen end on takes its nearer end (PAPERS.md): a zero step keeps the parameter at 0.
+        let (step, za, zb) =
+            if squared > 0.0 { (along / squared, za, zb) } else { (DVec2::ZERO, za.min(zb), za.min(zb)) };
+        let (from, to) = if reciprocal { (za.recip(), zb.recip()) } else { (za, zb) };
+        Axis { origin: a, step, from, change: to - from, reciprocal }
+    }
+
+    /// Fills one run of pixels of this limb in one row.
+    fn fill(&self, row: usize, column: usize, out: &mut [f32]) {
+        let start = (DVec2::new(column as f64, row as f64) - self.origin).dot(self.step);
+        let advance = self.step.x;
+        for (i, depth) in out.iter_mut().enumerate() {
+            let t = (start + advance * i as f64).clamp(0.0, 1.0);
+            *depth = (self.from + t * self.change) as f32;
+        }
+        if self.reciprocal {
+            out.iter_mut().for_each(|depth| *depth = depth.recip());
+        }
+    }
+}
+
+/// Writes the depth map of a labelled drawing: +inf where there is no limb.
+///
+/// `labels` and `out` are row-major with `width` columns; `ends` holds two pixel positions a limb, `end_depths` two
+/// depths a limb. Rows are worked in parallel; every row depends on its own labels only.
+pub fn limb_depth(
+    labels: &[u8],
+    width: usize,
+    ends: &[[DVec2; 2]],
+    end_depths: &[[f64; 2]],
+    interpolation: Interpolation,
+    out: &mut [f32],
+) -> Result<(), KernelError> {
+    check_length("out", labels.len(), out.len())?;
+    check_length("end_depths", ends.len(), end_depths.len())?;
+    if width == 0 {
+        return Ok(());
+    }
+    if interpolation == Interpolation::Perspective
+        && let Some(index) = end_depths.iter().position(|z| z[0] <= 0.0 || z[1] <= 0.0)
+    {
+        let problem = "perspective interpolation needs depths in front of the camera, got zero or less,";
+        return Err(KernelError::Item { argument: "end_depths", problem, index });
+    }
+    let axes: Vec<Axis> =
+        ends.iter().zip(end_depths).map(|([a, b], [za, zb])| Axis::new(*a, *b, *za, *zb, interpolation)).collect();
+    let rows = out.par_chunks_mut(width).zip(labels.par_chunks(width)).enumerate();
+    rows.try_for_each(|(row, (out, labels))| limb_depth_row(row, labels, &axes, out))
+}
+
+fn limb_depth_row(row: usize, labels: &[u8], axes: &[Axis], out: &mut [f32]) -> Result<(), KernelError> {
+    let mut column = 0;
+    for run in labels.chunk_by(|a, b| a == b) {
+        let depths = &mut out[column..column + run.len()];
+        match usize::from(run[0]).checked_sub(1) {
+            None => depths.fill(f32::INFINITY),
+            Some(limb) => axes
+                .get(limb)
+                .ok_or(KernelError::Pixel {
+                    argument: "labels",
+                    problem: "a label above the number of limbs",
+                    row,
+                    column,
+                })?
+                .fill(row, column, depths),
+        }
+        column += run.len();
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn depth_of(labels: &[u8], width: usize, a: DVec2, b: DVec2, z: [f64; 2], how: Interpolation) -> Vec<f32> {
+        let mut out = vec![0.0; labels.len()];
+        assert_eq!(limb_depth(labels, width, &[[a, b]], &[z], how, &mut out), Ok(()));
+        out
+    }
+
+    #[test]
+    fn runs_linearly_and_clamps_beyond_the_ends() {
+        let out = depth_of(&[1; 7], 7, DVec2::new(1., 0.), DVec2::new(5., 0.), [2., 4.], Interpolation::Linear);
+        assert_eq!(out, [2.0, 2.0, 2.5, 3.0, 3.5, 4.0, 4.0]);
+    }
+
+    #[test]
+    fn perspective_is_linear_in_reciprocal_depth() {
+        let out = depth_of(&[1; 3], 3, DVec2::ZERO, DVec2::new(2., 0.), [1., 3.], Interpolation::Perspective);
+        assert_eq!(out, [1.0, 1.5, 3.0]);
+    }
+
+    #[test]
+    fn end_on_limb_takes_its_nearer_end_and_background_is_infinite() {
+        let out = depth_of(&[0, 1], 2, DVec2::ONE, DVec2::ONE, [5., 3.], Interpolation::Linear);
+        assert_eq!(out, [f32::INFINITY, 3.0]);
+    }
+
+    #[test]
+    fn label_above_the_limbs_is_refused_with_its_place() {
+        let mut out = [0.0; 4];
+        let got = limb_depth(&[0, 0, 0, 2], 2, &[[DVec2::ZERO; 2]], &[[1.0; 2]], Interpolation::Linear, &mut out);
+        assert!(matches!(got, Err(KernelError::Pixel { row: 1, column: 1, .. })));
+    }
+}
