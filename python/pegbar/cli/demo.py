@@ -1,0 +1,78 @@
+"""`pegbar demo`: the sample shot, from nothing to finished frames."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from cyclopts import Parameter
+from numpy.typing import NDArray
+
+from pegbar.cli.batch import BatchOptions, progress, run_stage
+from pegbar.io.animation import write_animation
+from pegbar.io.frames import read_picture, write_image
+from pegbar.io.sequence import parse_frames
+from pegbar.report.contact_sheet import contact_sheet, over_paper
+from pegbar.sample.shot import write_sample
+from pegbar.shot.plan import Shot, open_shot
+from pegbar.shot.stages import CompositeStage, DepthStage
+
+SHEET = 12
+
+
+def demo(
+    folder: Path,
+    *,
+    frames: Annotated[str | None, Parameter(help="Frames to make, like 1-12 (default: all 48).")] = None,
+    jobs: Annotated[int | None, Parameter(help="Worker processes (default: one a core).")] = None,
+) -> int:
+    """Make a sample shot from nothing, a drawn dancer with a hoop and a ribbon, and run every stage on it.
+
+    Example: pegbar demo demo
+
+    Parameters
+    ----------
+    folder
+        Where to put it; made if it is not there.
+    """
+    start = time.perf_counter()
+    numbers = parse_frames(frames) if frames else None
+    with progress("sample", len(numbers) if numbers else 48) as advance:
+        path = write_sample(folder, frames=numbers, progress=advance)
+    shot, options = open_shot(path), BatchOptions(frames, jobs)
+    for name, stage in (("depth", DepthStage(shot)), ("composite", CompositeStage(shot))):
+        if code := run_stage(name, stage, options):
+            return code
+    sheet, animation = folder / "contact_sheet.png", folder / "animation.png"
+    chosen = options.select(shot.frames)
+    finals = [picture for frame in spread(chosen, SHEET) for picture in _rows(shot, frame)]
+    write_image(sheet, contact_sheet(finals, columns=6))
+    write_animation(animation, _finals(shot, chosen), shot.settings.shot.frame_rate)
+    print(f"\nMade in {time.perf_counter() - start:.1f} s:")
+    print(f"  {path}  the shot file: try pegbar check, depth, composite on it")
+    print(f"  {shot.output(shot.settings.output.frames, chosen[0]).parent}  finished frames")
+    print(f"  {sheet}  drawing, depth and finished frame side by side")
+    print(f"  {animation}  the animation: open it in a browser")
+    return 0
+
+
+def spread(frames: list[int], count: int) -> list[int]:
+    """Return at most ``count`` of ``frames``, evenly spread, in order."""
+    return [frames[i * len(frames) // min(count, len(frames))] for i in range(min(count, len(frames)))]
+
+
+def _rows(shot: Shot, frame: int) -> Iterator[NDArray[np.uint8]]:
+    """The drawing, its depth and the finished frame."""
+    output = shot.settings.output
+    yield read_picture(shot.drawings.path(shot.exposure.drawing(frame)))
+    if output.depth_picture:
+        yield read_picture(shot.output(output.depth_picture, frame))
+    yield read_picture(shot.output(output.frames, frame))
+
+
+def _finals(shot: Shot, frames: list[int]) -> Iterator[NDArray[np.uint8]]:
+    for frame in frames:
+        yield over_paper(read_picture(shot.output(shot.settings.output.frames, frame)))

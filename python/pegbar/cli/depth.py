@@ -1,0 +1,23 @@
+"""`pegbar depth`: depth of every drawn pixel."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pegbar.cli.batch import BatchOptions, run_stage
+from pegbar.shot.plan import open_shot
+from pegbar.shot.stages import DepthStage
+
+
+def depth(shot: Path, options: BatchOptions | None = None) -> int:
+    """Write the depth of every drawn pixel: an EXR map in metres, and a picture of it.
+
+    Example: pegbar depth shot.toml --frames 1-48
+
+    Parameters
+    ----------
+    shot
+        The shot file.
+    """
+    options = options or BatchOptions()
+    return run_stage("depth", DepthStage(open_shot(shot), options.overwrite), options)

@@ -1,0 +1,41 @@
+"""`pegbar init`: a shot file for a folder of drawn frames."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from pegbar.io.atomic import complete_file
+from pegbar.shot.start import start_shot
+
+
+def init(
+    frames: Path,
+    *,
+    output: Annotated[Path | None, Parameter(help="The shot file (default: FRAMES/shot.toml).")] = None,
+    overwrite: Annotated[bool, Parameter(negative="", help="Replace a shot file that is there.")] = False,
+) -> int:
+    """Write a shot file for a folder of drawn frames.
+
+    Label pictures, annotations and rendered passes beside the drawings are found by their names; what is missing
+    stands in the file as a comment to fill in.
+
+    Example: pegbar init my_shot
+
+    Parameters
+    ----------
+    frames
+        The folder with the drawn frames.
+    """
+    if not frames.is_dir():
+        raise NotADirectoryError(f"{frames}: no such folder")
+    target = output or frames / "shot.toml"
+    if target.exists() and not overwrite:
+        raise FileExistsError(f"{target}: is there already (--overwrite replaces it)")
+    text = start_shot(frames)
+    with complete_file(target) as part:
+        part.write_text(text, encoding="utf-8")
+    print(f"init: wrote {target}; look it over, then run: pegbar check {target}")
+    return 0

@@ -1,0 +1,49 @@
+"""`pegbar`: finds the command and turns errors into one line and an exit code.
+
+Exit codes: 0 done, 1 some frames failed (or `check` found problems), 2 wrong usage, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from importlib.metadata import version
+
+from cyclopts import App, CycloptsError
+
+app = App(
+    name="pegbar",
+    help="Hand-drawn animation and motion capture: depth for drawings, and depth compositing with 3D renders.",
+    version=lambda: version("pegbar"),
+    help_format="plaintext",
+)
+# The commands' modules are imported when they run, so the summaries stand here.
+COMMANDS = {
+    "init": "Write a shot file for a folder of drawn frames.",
+    "check": "Read all that a shot names and report every problem at once.",
+    "depth": "Write the depth of every drawn pixel.",
+    "composite": "Composite drawing and rendered passes in depth order.",
+    "demo": "Make a sample shot from nothing and run every stage on it.",
+}
+for command, summary in COMMANDS.items():
+    app.command(f"pegbar.cli.{command}:{command}", name=command, help=summary)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line with ``arguments`` (None: the process's own) and return the exit code."""
+    try:
+        code = app(arguments, exit_on_error=False, print_error=False)
+    except CycloptsError as error:
+        return _fail(f"{error} (see pegbar --help)")
+    except (ValueError, OSError) as error:
+        return _fail(str(error))
+    except KeyboardInterrupt:
+        print("pegbar: interrupted; the finished frames are kept, run it again to go on", file=sys.stderr)
+        return 130
+    return code if isinstance(code, int) else 0
+
+
+def _fail(message: str) -> int:
+    for line in message.splitlines():
+        print(f"pegbar: {line}", file=sys.stderr)
+    return 2

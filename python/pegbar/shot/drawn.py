@@ -1,0 +1,135 @@
+"""One drawn frame read from its files and made ready: colour, alpha and depth of every pixel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pegbar.errors import DegenerateError
+from pegbar.io.exr import read_passes
+from pegbar.io.frames import read_picture
+from pegbar.layer.depth import limb_depth
+from pegbar.layer.matte import matte
+from pegbar.layer.segmentation import grow_labels, palette_labels, segment_stick_figure
+from pegbar.shot.plan import Shot
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """A drawn frame: ``color`` (H, W, 3) uint8 straight, ``alpha`` and ``depth`` (H, W) float32, and what to note."""
+
+    color: NDArray[np.uint8]
+    alpha: NDArray[np.float32]
+    depth: NDArray[np.float32]
+    notes: tuple[str, ...] = ()
+
+
+def drawn_inputs(shot: Shot, frame: int) -> list[Path]:
+    """Return the picture files that `read_drawn` reads for ``frame``."""
+    number = shot.exposure.drawing(frame)
+    sequences = (shot.drawings, shot.labels, shot.drawing_depth)
+    return [sequence.path(number) for sequence in sequences if sequence is not None]
+
+
+def read_drawn(shot: Shot, frame: int) -> Drawn:
+    """Read the drawing of ``frame`` and find every pixel's alpha and depth (2010 paper, section 3.3.1).
+
+    Raises ValueError or OSError, naming file and frame, for what cannot be read or does not fit together.
+    """
+    number, settings = shot.exposure.drawing(frame), shot.settings.drawing
+    path = shot.drawings.path(number)
+    picture = read_picture(path)
+    _check_size(frame, path, picture, shot.settings.shot.size)
+    labels, notes = _labels(shot, frame, picture)
+    try:
+        layer = matte(picture, settings.matte, labels=labels)
+    except ValueError as error:
+        raise ValueError(f"frame {frame}: {path}: {error}") from None
+    if shot.drawing_depth is not None:
+        depth_path = shot.drawing_depth.path(number)
+        depth = read_passes(depth_path, want=("depth",)).depth
+        assert depth is not None
+        _check_size(frame, depth_path, depth, _size(picture))
+        return Drawn(layer.color, layer.alpha, depth, notes)
+    if labels is None:
+        raise ValueError(
+            f"frame {frame}: no depth: the shot needs drawing.labels (limb colours), drawing.half_width (a stick "
+            "figure) or drawing.depth"
+        )
+    grown = grow_labels(labels, layer.alpha > 0, reach=settings.reach)
+    ends, end_depths = limb_ends(shot, frame, grown)
+    return Drawn(layer.color, layer.alpha, limb_depth(grown, ends, end_depths, interpolation=settings.interpolation), notes)
+
+
+def limb_ends(shot: Shot, frame: int, labels: NDArray[np.uint8]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the (V, 2, 2) pixels and (V, 2) depths of the limbs' markers in ``frame``.
+
+    Raises DegenerateError where a limb that ``labels`` shows lacks a marker or its depth.
+    """
+    marks = shot.annotations
+    if marks is None or not marks.limbs:
+        raise ValueError(f"frame {frame}: no limbs: the shot needs drawing.annotations with limbs")
+    if marks.depths is None:
+        raise ValueError(f"frame {frame}: the annotations give no depths of the markers")
+    index, pairs = shot.annotation_index(frame), marks.limb_markers
+    ends, depths = marks.markers[index][pairs], marks.depths[index][pairs]
+    missing = ~(np.isfinite(ends).all(axis=2) & np.isfinite(depths))
+    shown = np.flatnonzero(np.bincount(labels.ravel(), minlength=len(pairs) + 1)[1:])
+    for limb in shown[missing[shown].any(axis=1)]:
+        marker = marks.names[pairs[limb][int(np.argmax(missing[limb]))]]
+        raise DegenerateError(f"frame {frame}: limb {marks.limbs[limb].name}: marker {marker} has no place or no depth")
+    return np.where(missing[..., None], 0.0, ends), np.where(missing, 1.0, depths)
+
+
+def _labels(
+    shot: Shot, frame: int, picture: NDArray[np.uint8]
+) -> tuple[NDArray[np.uint8] | None, tuple[str, ...]]:
+    settings = shot.settings.drawing
+    if shot.labels is not None:
+        return _painted_labels(shot, frame, picture)
+    if settings.half_width is not None and shot.annotations is not None:
+        marks = shot.annotations
+        ends = marks.markers[shot.annotation_index(frame)][marks.limb_markers]
+        gray = _gray_over_white(picture)
+        return segment_stick_figure(gray, ends, settings.half_width, threshold=settings.threshold), ()
+    return None, ()
+
+
+def _painted_labels(
+    shot: Shot, frame: int, picture: NDArray[np.uint8]
+) -> tuple[NDArray[np.uint8], tuple[str, ...]]:
+    assert shot.labels is not None
+    path = shot.labels.path(shot.exposure.drawing(frame))
+    painted = read_picture(path)
+    _check_size(frame, path, painted, _size(picture))
+    palette, tolerance = shot.palette, shot.settings.drawing.tolerance
+    if not len(palette.colors):
+        raise ValueError(f"frame {frame}: no limb colours: the annotations' limbs have none and there is no palette")
+    found = palette_labels(
+        painted, palette.colors, palette.labels, tolerance=tolerance, background=palette.background
+    )
+    if not found.unmatched or found.first_unmatched is None:
+        return found.labels, ()
+    row, column = found.first_unmatched
+    color = "#" + bytes(painted[row, column, :3]).hex()
+    note = f"frame {frame}: {path}: {found.unmatched} pixels match no limb, first {color} at row {row}, column {column}"
+    return found.labels, (note,)
+
+
+def _gray_over_white(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    from pegbar.layer.matte import ink_alpha
+
+    return np.rint(255 - 255 * ink_alpha(picture)).astype(np.uint8)
+
+
+def _size(picture: NDArray[np.uint8]) -> tuple[int, int]:
+    return picture.shape[1], picture.shape[0]
+
+
+def _check_size(frame: int, path: Path, image: NDArray[np.generic], size: tuple[int, int] | None) -> None:
+    height, width = image.shape[:2]
+    if size is not None and (width, height) != tuple(size):
+        raise ValueError(f"frame {frame}: {path}: want {size[0]} x {size[1]} pixels, got {width} x {height}")

@@ -1,0 +1,121 @@
+"""The shot file's sections as validated values. Unknown keys and wrong values are refused, none is ignored."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254, "foot": 0.3048}
+
+
+def parse_color(text: str) -> tuple[int, int, int]:
+    """Return the (red, green, blue) of "#rrggbb"; ValueError for anything else."""
+    digits = text.removeprefix("#")
+    if len(digits) != 6 or not text.startswith("#"):
+        raise ValueError(f'want a colour like "#ff8000", got "{text}"')
+    try:
+        red, green, blue = bytes.fromhex(digits)
+    except ValueError:
+        raise ValueError(f'want a colour like "#ff8000", got "{text}"') from None
+    return red, green, blue
+
+
+def _check_color(text: str) -> str:
+    parse_color(text)
+    return text.lower()
+
+
+Color = Annotated[str, AfterValidator(_check_color)]
+
+
+class Section(BaseModel):
+    """What every section has in common: frozen, and no key that pegbar does not know."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, str_min_length=1)
+
+
+class ShotSection(Section):
+    """``[shot]``: which frames, how fast, how large."""
+
+    name: str | None = None
+    frames: str | None = None
+    frame_rate: float = Field(24.0, gt=0, allow_inf_nan=False)
+    size: tuple[Annotated[int, Field(gt=0)], Annotated[int, Field(gt=0)]] | None = None
+
+
+class DrawingSection(Section):
+    """``[drawing]``: the drawn frames, what is known of their limbs, and how opaque they are."""
+
+    frames: str
+    hold: Annotated[int, Field(ge=1)] | list[int] | Literal["sparse"] = 1
+    labels: str | None = None
+    annotations: str | None = None
+    depth: str | None = None
+    palette: dict[Color, str] = {}
+    tolerance: float = Field(0.0, ge=0, le=442, allow_inf_nan=False)
+    background: list[Color] = ["#000000"]
+    reach: float | None = Field(None, ge=0, allow_inf_nan=False)
+    half_width: float | None = Field(None, gt=0, allow_inf_nan=False)
+    threshold: int = Field(128, ge=0, le=255)
+    matte: Literal["auto", "ink", "unmix", "fill", "alpha"] = "auto"
+    interpolation: Literal["linear", "perspective"] = "linear"
+
+
+class CameraSection(Section):
+    """``[camera]``: a still camera, in place of the one in the annotations."""
+
+    matrix: list[Annotated[list[float], Field(min_length=4, max_length=4)]] = Field(min_length=3, max_length=3)
+
+
+class PassesSection(Section):
+    """``[passes]``: what the 3D renderer wrote."""
+
+    beauty: str
+    depth: str | None = None
+    layer: str | None = None
+    unit: Literal["m", "cm", "mm", "inch", "foot"] | Annotated[float, Field(gt=0, allow_inf_nan=False)] = "m"
+    space: Literal["auto", "linear", "display"] = "auto"
+
+    @property
+    def metres(self) -> float:
+        """Metres per unit of the depth pass."""
+        return UNITS[self.unit] if isinstance(self.unit, str) else self.unit
+
+
+class OutputSection(Section):
+    """``[output]``: what is written, as patterns with a frame number."""
+
+    frames: str = "final/final.####.png"
+    depth: str = "depth/depth.####.exr"
+    depth_picture: str | None = "depth/depth.####.png"
+    holdout: str | None = None
+    space: Literal["auto", "display", "linear"] = "auto"
+
+    @model_validator(mode="after")
+    def _linear_needs_floats(self) -> OutputSection:
+        if self.space == "linear" and not self.is_exr:
+            raise ValueError('space = "linear" writes linear light, which only .exr frames hold')
+        return self
+
+    @property
+    def is_exr(self) -> bool:
+        """Whether the final frames are EXR files."""
+        return self.frames.lower().endswith(".exr")
+
+    @property
+    def composite_space(self) -> Literal["display", "linear"]:
+        """The space that the final frames are composited and written in: EXR files hold linear light."""
+        if self.space == "auto":
+            return "linear" if self.is_exr else "display"
+        return self.space
+
+
+class ShotFile(Section):
+    """A whole shot file. Later steps add sections."""
+
+    shot: ShotSection = ShotSection()
+    drawing: DrawingSection
+    camera: CameraSection | None = None
+    passes: PassesSection | None = None
+    output: OutputSection = OutputSection()

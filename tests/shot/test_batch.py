@@ -1,0 +1,71 @@
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from pegbar.shot.batch import run_frames
+from tests.shot.tasks import Die, Slow, Square, Threads
+
+
+@pytest.mark.parametrize("jobs", [1, 3])
+def test_every_frame_comes_once_and_a_failure_is_one_line(jobs):
+    results = sorted(run_frames(Square(), [1, 2, 13, 5], jobs=jobs), key=lambda r: r.frame)
+    assert [(r.frame, r.value) for r in results] == [(1, 1), (2, 4), (5, 25), (13, None)]
+    assert [r.error for r in results] == [None, None, None, "frame 13: is unlucky"]
+
+
+def test_a_worker_that_is_killed_fails_its_frame_only():
+    results = {r.frame: r for r in run_frames(Die(), [1, 2, 3, 4, 5, 6], jobs=2)}
+    assert "worker process ended" in results[3].error
+    assert [results[f].value for f in (1, 2, 4, 5, 6)] == [1, 2, 4, 5, 6]
+
+
+def test_workers_keep_to_one_thread_and_leave_our_environment_alone():
+    before = dict(os.environ)
+    values = [r.value for r in run_frames(Threads(), [1, 2, 3, 4], jobs=2)]
+    assert {threads for _, *threads_ in values for threads in [tuple(threads_)]} == {("1", 1)}
+    assert os.getpid() not in {pid for pid, *_ in values}
+    assert dict(os.environ) == before
+
+
+def test_closing_early_ends_the_workers(tmp_path):
+    results = run_frames(Slow(tmp_path), list(range(100)), jobs=2)
+    next(results)
+    results.close()
+    assert_gone(int(path.name) for path in tmp_path.iterdir())
+
+
+def test_workers_end_when_the_parent_is_killed(tmp_path):
+    code = (
+        "from pathlib import Path; from pegbar.shot.batch import run_frames; from tests.shot.tasks import Slow\n"
+        f"if __name__ == '__main__':\n  for r in run_frames(Slow(Path({str(tmp_path)!r})), list(range(500)), jobs=2): print(1, flush=True)"
+    )
+    script = tmp_path.with_suffix(".py")
+    script.write_text(code)
+    environment = {**os.environ, "PYTHONPATH": os.getcwd()}
+    parent = subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE, env=environment)
+    parent.stdout.readline()
+    parent.kill()
+    parent.wait()
+    parent.stdout.close()
+    assert_gone(int(path.name) for path in tmp_path.iterdir())
+
+
+def assert_gone(processes, seconds=5.0):
+    end = time.monotonic() + seconds
+    for process in processes:
+        while is_running(process):
+            assert time.monotonic() < end, f"process {process} is still running"
+            time.sleep(0.02)
+
+
+def is_running(process):
+    try:
+        os.kill(process, signal.SIG_DFL)
+        return Path(f"/proc/{process}/stat").read_text().split()[2] != "Z"
+    except (ProcessLookupError, FileNotFoundError):
+        return False
