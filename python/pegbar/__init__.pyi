@@ -3,6 +3,7 @@ from .errors import FormatError as FormatError
 from .errors import MissingFrameError as MissingFrameError
 from .errors import PegbarError as PegbarError
 from .errors import ShotError as ShotError
+from .layer.composite import depth_composite as depth_composite
 from .layer.depth import limb_depth as limb_depth
 from .scene.camera import PerspectiveCamera as PerspectiveCamera
 from .scene.drawing import Drawing as Drawing

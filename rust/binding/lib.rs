@@ -1,6 +1,7 @@
 //! `pegbar._kernels`: registers the wrappers; each file carries its kernel's name.
 
 mod arrays;
+mod composite;
 mod depth;
 mod errors;
 
@@ -9,6 +10,8 @@ use pyo3::prelude::*;
 /// The Rust kernels of pegbar. Strict and private: call the functions of the `pegbar` package instead.
 #[pymodule(gil_used = false)]
 mod _kernels {
+    #[pymodule_export]
+    use crate::composite::depth_composite;
     #[pymodule_export]
     use crate::depth::limb_depth;
 }
