@@ -3,6 +3,10 @@
 mod arrays;
 mod depth;
 mod errors;
+mod grow;
+mod matte;
+mod palette;
+mod segment;
 
 use pyo3::prelude::*;
 
@@ -11,4 +15,12 @@ use pyo3::prelude::*;
 mod _kernels {
     #[pymodule_export]
     use crate::depth::limb_depth;
+    #[pymodule_export]
+    use crate::grow::grow_labels;
+    #[pymodule_export]
+    use crate::matte::{has_alpha, ink_alpha, matte};
+    #[pymodule_export]
+    use crate::palette::palette_labels;
+    #[pymodule_export]
+    use crate::segment::segment_stick_figure;
 }

@@ -2,3 +2,8 @@
 
 pub mod depth;
 pub mod error;
+pub mod grow;
+pub mod matte;
+pub mod palette;
+pub mod segment;
+mod settle;
