@@ -5,6 +5,13 @@ from .errors import PegbarError as PegbarError
 from .errors import ShotError as ShotError
 from .layer.composite import depth_composite as depth_composite
 from .layer.depth import limb_depth as limb_depth
+from .layer.matte import Matte as Matte
+from .layer.matte import ink_alpha as ink_alpha
+from .layer.matte import matte as matte
+from .layer.segmentation import LabelMap as LabelMap
+from .layer.segmentation import grow_labels as grow_labels
+from .layer.segmentation import palette_labels as palette_labels
+from .layer.segmentation import segment_stick_figure as segment_stick_figure
 from .scene.camera import PerspectiveCamera as PerspectiveCamera
 from .scene.drawing import Drawing as Drawing
 from .scene.drawing import Limb as Limb

@@ -1,9 +1,18 @@
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-from typing import Any
-
-__all__ = ["depth_composite", "limb_depth"]
+__all__ = [
+    "depth_composite",
+    "grow_labels",
+    "has_alpha",
+    "ink_alpha",
+    "limb_depth",
+    "matte",
+    "palette_labels",
+    "segment_stick_figure",
+]
 
 def depth_composite(
     drawing: NDArray[np.uint8],
@@ -15,7 +24,18 @@ def depth_composite(
     linear: list[bool],
     out: NDArray[Any],
 ) -> None: ...
-
 def limb_depth(
     labels: NDArray[np.uint8], ends: NDArray[np.float64], end_depths: NDArray[np.float64], perspective: bool
 ) -> NDArray[np.float32]: ...
+def segment_stick_figure(
+    gray: NDArray[np.uint8], ends: NDArray[np.float64], half_widths: NDArray[np.float64], threshold: int
+) -> NDArray[np.uint8]: ...
+def palette_labels(
+    segmentation: NDArray[np.uint8], colors: NDArray[np.uint8], labels: NDArray[np.uint8], tolerance: float
+) -> tuple[NDArray[np.uint8], int, list[int] | None]: ...
+def grow_labels(labels: NDArray[np.uint8], figure: NDArray[np.uint8], reach: float | None) -> NDArray[np.uint8]: ...
+def ink_alpha(image: NDArray[np.uint8]) -> NDArray[np.float32]: ...
+def has_alpha(image: NDArray[np.uint8]) -> bool: ...
+def matte(
+    image: NDArray[np.uint8], mode: str, labels: NDArray[np.uint8] | None
+) -> tuple[NDArray[np.uint8], NDArray[np.float32]]: ...

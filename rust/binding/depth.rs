@@ -1,6 +1,6 @@
 //! Wrapper of `kernels/depth.rs`.
 
-use crate::arrays::{grouped, slice};
+use crate::arrays::{empty, grouped, slice};
 use crate::errors::to_python;
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pegbar_kernels::depth::{self, Interpolation};
@@ -15,7 +15,7 @@ pub fn limb_depth<'py>(
     perspective: bool,
 ) -> PyResult<Bound<'py, PyArray2<f32>>> {
     let [height, width] = [labels.shape()[0], labels.shape()[1]];
-    let out = PyArray2::zeros(py, [height, width], false);
+    let out: Bound<'py, PyArray2<f32>> = empty(py, [height, width])?;
     let mut target = out.readwrite();
     let (labels, pixels) = (slice("labels", &labels)?, target.as_slice_mut()?);
     let (ends, depths) = (grouped("ends", &ends)?, grouped("end_depths", &end_depths)?);

@@ -4,6 +4,10 @@ mod arrays;
 mod composite;
 mod depth;
 mod errors;
+mod grow;
+mod matte;
+mod palette;
+mod segment;
 
 use pyo3::prelude::*;
 
@@ -14,4 +18,12 @@ mod _kernels {
     use crate::composite::depth_composite;
     #[pymodule_export]
     use crate::depth::limb_depth;
+    #[pymodule_export]
+    use crate::grow::grow_labels;
+    #[pymodule_export]
+    use crate::matte::{has_alpha, ink_alpha, matte};
+    #[pymodule_export]
+    use crate::palette::palette_labels;
+    #[pymodule_export]
+    use crate::segment::segment_stick_figure;
 }

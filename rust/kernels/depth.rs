@@ -16,13 +16,14 @@ pub enum Interpolation {
     Perspective,
 }
 
-/// One limb made ready for its pixels: the parameter along the axis is affine in the pixel's place.
+/// One limb made ready for its pixels: depth, or one over it, is affine in the pixel's place and ends at the markers'.
 #[derive(Clone, Copy)]
 struct Axis {
     origin: DVec2,
-    step: DVec2,
-    from: f64,
-    change: f64,
+    slope: DVec2,
+    at_origin: f64,
+    low: f64,
+    high: f64,
     reciprocal: bool,
 }
 
@@ -31,25 +32,38 @@ impl Axis {
         let along = b - a;
         let squared = along.length_squared();
         let reciprocal = interpolation == Interpolation::Perspective;
-        // A limb seen end on takes its nearer end (PAPERS.md): a zero step keeps the parameter at 0.
-        let (step, za, zb) =
-            if squared > 0.0 { (along / squared, za, zb) } else { (DVec2::ZERO, za.min(zb), za.min(zb)) };
+        // A limb seen end on takes its nearer end (PAPERS.md): without a slope the depth stays there.
+        let (za, zb) = if squared > 0.0 { (za, zb) } else { (za.min(zb), za.min(zb)) };
         let (from, to) = if reciprocal { (za.recip(), zb.recip()) } else { (za, zb) };
-        Axis { origin: a, step, from, change: to - from, reciprocal }
+        let slope = if squared > 0.0 { along * ((to - from) / squared) } else { DVec2::ZERO };
+        Axis { origin: a, slope, at_origin: from, low: from.min(to), high: from.max(to), reciprocal }
     }
 
     /// Fills one run of pixels of this limb in one row.
     fn fill(&self, row: usize, column: usize, out: &mut [f32]) {
-        let start = (DVec2::new(column as f64, row as f64) - self.origin).dot(self.step);
-        let advance = self.step.x;
-        for (i, depth) in out.iter_mut().enumerate() {
-            let t = (start + advance * i as f64).clamp(0.0, 1.0);
-            *depth = (self.from + t * self.change) as f32;
-        }
-        if self.reciprocal {
-            out.iter_mut().for_each(|depth| *depth = depth.recip());
+        let start = self.at_origin + (DVec2::new(column as f64, row as f64) - self.origin).dot(self.slope);
+        for (block, out) in out.chunks_mut(BLOCK).enumerate() {
+            let start = start + self.slope.x * (block * BLOCK) as f64;
+            for (depth, i) in out.iter_mut().zip(0i32..) {
+                *depth = (start + self.slope.x * f64::from(i)).max(self.low).min(self.high) as f32;
+            }
+            if self.reciprocal {
+                out.iter_mut().for_each(|depth| *depth = depth.recip());
+            }
         }
     }
+}
+
+/// Pixels worked at a time: their reciprocals are taken while they are in the fastest memory.
+const BLOCK: usize = 256;
+
+/// How many labels at the front are the same.
+fn run_length(labels: &[u8]) -> usize {
+    let (blocks, rest) = labels.as_chunks::<32>();
+    let first = labels[0];
+    let whole = blocks.iter().take_while(|block| **block == [first; 32]).count();
+    let next = blocks.get(whole).map_or(rest, |block| block);
+    whole * 32 + next.iter().take_while(|label| **label == first).count()
 }
 
 /// Writes the depth map of a labelled drawing: +inf where there is no limb.
@@ -83,9 +97,10 @@ pub fn limb_depth(
 
 fn limb_depth_row(row: usize, labels: &[u8], axes: &[Axis], out: &mut [f32]) -> Result<(), KernelError> {
     let mut column = 0;
-    for run in labels.chunk_by(|a, b| a == b) {
-        let depths = &mut out[column..column + run.len()];
-        match usize::from(run[0]).checked_sub(1) {
+    while column < labels.len() {
+        let length = run_length(&labels[column..]);
+        let depths = &mut out[column..column + length];
+        match usize::from(labels[column]).checked_sub(1) {
             None => depths.fill(f32::INFINITY),
             Some(limb) => axes
                 .get(limb)
@@ -97,7 +112,7 @@ fn limb_depth_row(row: usize, labels: &[u8], axes: &[Axis], out: &mut [f32]) -> 
                 })?
                 .fill(row, column, depths),
         }
-        column += run.len();
+        column += length;
     }
     Ok(())
 }

@@ -5,3 +5,8 @@ pub mod composite;
 pub mod composite_block;
 pub mod depth;
 pub mod error;
+pub mod grow;
+pub mod matte;
+pub mod palette;
+pub mod segment;
+mod settle;

@@ -1,0 +1,54 @@
+//! Wrapper of `kernels/matte.rs`.
+
+use crate::arrays::{empty, slice};
+use crate::errors::to_python;
+use numpy::{PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use pegbar_kernels::matte::{self as kernel, Mode};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+type ColorAndAlpha<'py> = (Bound<'py, PyArray3<u8>>, Bound<'py, PyArray2<f32>>);
+
+#[pyfunction]
+pub fn ink_alpha<'py>(py: Python<'py>, image: PyReadonlyArray3<'py, u8>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    let [height, width, channels] = [image.shape()[0], image.shape()[1], image.shape()[2]];
+    let out: Bound<'py, PyArray2<f32>> = empty(py, [height, width])?;
+    let mut target = out.readwrite();
+    let (image, alpha) = (slice("image", &image)?, target.as_slice_mut()?);
+    py.detach(|| kernel::ink_alpha(image, channels, width, alpha)).map_err(to_python)?;
+    drop(target);
+    Ok(out)
+}
+
+#[pyfunction]
+pub fn has_alpha(py: Python<'_>, image: PyReadonlyArray3<'_, u8>) -> PyResult<bool> {
+    let channels = image.shape()[2];
+    let image = slice("image", &image)?;
+    Ok(py.detach(|| kernel::has_alpha(image, channels)))
+}
+
+#[pyfunction]
+#[pyo3(signature = (image, mode, labels))]
+pub fn matte<'py>(
+    py: Python<'py>,
+    image: PyReadonlyArray3<'py, u8>,
+    mode: &str,
+    labels: Option<PyReadonlyArray2<'py, u8>>,
+) -> PyResult<ColorAndAlpha<'py>> {
+    let [height, width, channels] = [image.shape()[0], image.shape()[1], image.shape()[2]];
+    let color: Bound<'py, PyArray3<u8>> = empty(py, [height, width, 3])?;
+    let alpha: Bound<'py, PyArray2<f32>> = empty(py, [height, width])?;
+    let (mut colors, mut alphas) = (color.readwrite(), alpha.readwrite());
+    let (image, colors_out, alphas_out) = (slice("image", &image)?, colors.as_slice_mut()?, alphas.as_slice_mut()?);
+    let labels = labels.as_ref().map(|labels| slice("labels", labels)).transpose()?;
+    let mode = match (mode, labels) {
+        ("ink", _) => Mode::Ink,
+        ("unmix", _) => Mode::Unmix,
+        ("fill", Some(labels)) => Mode::Fill(labels),
+        ("alpha", _) => Mode::Alpha,
+        _ => return Err(PyValueError::new_err("mode: unknown, or fill without labels")),
+    };
+    py.detach(|| kernel::matte(mode, image, channels, width, colors_out, alphas_out)).map_err(to_python)?;
+    drop((colors, alphas));
+    Ok((color, alpha))
+}
