@@ -54,14 +54,14 @@ def paired(shot: Shot) -> tuple[float, float]:
         start = time.perf_counter()
         stage(frame)
         middle = time.perf_counter()
-        final = read_picture(shot.output(shot.settings.output.frames, frame))
+        final = read_picture(stage.outputs(frame)[0])
         ready = time.perf_counter()
         read_picture(shot.drawings.path(frame))
         assert shot.labels is not None
         assert shot.beauty is not None
         read_picture(shot.labels.path(frame))
         read_passes(shot.beauty.path(frame))
-        write_image(shot.output(shot.settings.output.frames, frame), final)
+        write_image(stage.outputs(frame)[0], final)
         whole.append(1e3 * (middle - start))
         files.append(1e3 * (time.perf_counter() - ready))
     return statistics.median(whole[1:]), statistics.median(files[1:])

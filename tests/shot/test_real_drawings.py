@@ -79,7 +79,7 @@ def test_at_every_crossing_the_order_is_the_3d_order(walk):
     shot, marks, samples = walk
     met = {True: 0, False: 0}
     for frame in shot.frames:
-        drawn, final = read_drawn(shot, frame), read_picture(shot.output("final.####.png", frame)).astype(int)
+        drawn, final = read_drawn(shot, frame), read_picture(shot.output("frames", frame)).astype(int)
         beauty, near, far = rendered(shot, frame, samples)
         solid = (drawn.alpha == 1) & (beauty[..., 3] == 1)
         nearest, farthest = limb_range(shot, marks, frame)
@@ -96,7 +96,7 @@ def test_at_every_crossing_the_order_is_the_3d_order(walk):
 def test_no_fringe_stands_round_the_figure(walk):
     shot, _, samples = walk
     for frame in shot.frames:
-        drawn, final = read_drawn(shot, frame), read_picture(shot.output("final.####.png", frame)).astype(int)
+        drawn, final = read_drawn(shot, frame), read_picture(shot.output("frames", frame)).astype(int)
         beauty, near, far = rendered(shot, frame, samples)
         soft = (drawn.alpha > 0) & (drawn.alpha < 1)
         assert soft.any()

@@ -11,7 +11,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from pegbar.io.sequence import format_frames, parse_frames
+from pegbar.io.numbers import format_frames, parse_frames
 from pegbar.shot.batch import FrameResult, run_frames
 from pegbar.shot.stages import Stage
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pegbar.cli.batch import BatchOptions, progress, run_stage
 from pegbar.io.animation import write_animation
 from pegbar.io.frames import read_picture, write_image
-from pegbar.io.sequence import parse_frames
+from pegbar.io.numbers import parse_frames
 from pegbar.report.contact_sheet import contact_sheet, over_paper
 from pegbar.sample.shot import write_sample
 from pegbar.shot.plan import Shot, open_shot
@@ -53,7 +53,7 @@ def demo(
     write_animation(animation, _finals(shot, chosen), shot.settings.shot.frame_rate)
     print(f"\nMade in {time.perf_counter() - start:.1f} s:")
     print(f"  {path}  the shot file: try pegbar check, depth, composite on it")
-    print(f"  {shot.output(shot.settings.output.frames, chosen[0]).parent}  finished frames")
+    print(f"  {final_path(shot, chosen[0]).parent}  finished frames")
     print(f"  {sheet}  drawing, depth and finished frame side by side")
     print(f"  {animation}  the animation: open it in a browser")
     return 0
@@ -64,15 +64,18 @@ def spread(frames: list[int], count: int) -> list[int]:
     return [frames[i * len(frames) // min(count, len(frames))] for i in range(min(count, len(frames)))]
 
 
+def final_path(shot: Shot, frame: int) -> Path:
+    """Return where the finished ``frame`` is."""
+    return CompositeStage(shot).outputs(frame)[0]
+
+
 def _rows(shot: Shot, frame: int) -> Iterator[NDArray[np.uint8]]:
     """The drawing, its depth and the finished frame."""
-    output = shot.settings.output
     yield read_picture(shot.drawings.path(shot.exposure.drawing(frame)))
-    if output.depth_picture:
-        yield read_picture(shot.output(output.depth_picture, frame))
-    yield read_picture(shot.output(output.frames, frame))
+    yield read_picture(DepthStage(shot).outputs(frame)[1])
+    yield read_picture(final_path(shot, frame))
 
 
 def _finals(shot: Shot, frames: list[int]) -> Iterator[NDArray[np.uint8]]:
     for frame in frames:
-        yield over_paper(read_picture(shot.output(shot.settings.output.frames, frame)))
+        yield over_paper(read_picture(final_path(shot, frame)))

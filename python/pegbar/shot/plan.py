@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,13 +13,16 @@ from numpy.typing import NDArray
 
 from pegbar.errors import ShotError
 from pegbar.io.annotations import read_annotations
-from pegbar.io.sequence import Exposure, FrameSequence, parse_frames
+from pegbar.io.exposure import Exposure
+from pegbar.io.numbers import parse_frames
+from pegbar.io.sequence import FrameSequence
 from pegbar.scene.camera import PerspectiveCamera
 from pegbar.scene.drawing import Drawing
 from pegbar.shot.load import key_lines, load_shot
 from pegbar.shot.model import ShotFile, parse_color
 
 T = TypeVar("T")
+OUTPUTS = ("frames", "depth", "depth_picture", "holdout")
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,10 +49,11 @@ class Shot:
     depth: FrameSequence | None
     annotations: Drawing | None
     palette: Palette
+    outputs: dict[str, FrameSequence]
 
-    def output(self, pattern: str, frame: int) -> Path:
-        """Return the path of ``frame`` in an output ``pattern`` of the shot file."""
-        return FrameSequence.parse(str(self.folder / pattern)).path(frame)
+    def output(self, key: str, frame: int) -> Path | None:
+        """Return where ``frame`` of ``[output] key`` goes, or None where the shot file asks for none."""
+        return self.outputs[key].path(frame) if key in self.outputs else None
 
     def annotation_index(self, frame: int) -> int:
         """Return which frame of the annotations belongs to shot frame ``frame``.
@@ -92,10 +97,10 @@ def plan_shot(settings: ShotFile, folder: Path, source: str = "options", text: s
     if settings.camera:
         size = settings.shot.size or (annotations.image_size if annotations else (1, 1))
         finder.call("camera.matrix", PerspectiveCamera, settings.camera.matrix, size)
-    for output in ("frames", "depth", "depth_picture", "holdout"):
-        finder.call(f"output.{output}", _check_output, folder, getattr(settings.output, output))
+    patterns = {key: getattr(settings.output, key) for key in OUTPUTS}
+    outputs = {key: finder.call(f"output.{key}", _output, folder, text) for key, text in patterns.items() if text}
     if drawings is not None:
-        exposure = finder.call("drawing.hold", Exposure, drawing.hold, drawings.numbers)
+        exposure = finder.call("drawing.hold", Exposure.of, drawing.hold, drawings.numbers)
         frames = finder.call("shot.frames", _frames, settings, drawings, exposure, beauty)
     if finder.problems:
         raise ShotError(finder.problems)
@@ -104,7 +109,18 @@ def plan_shot(settings: ShotFile, folder: Path, source: str = "options", text: s
     assert exposure is not None
     assert frames is not None
     return Shot(
-        settings, folder, frames, drawings, exposure, labels, drawing_depth, beauty, depth or beauty, annotations, palette
+        settings,
+        folder,
+        frames,
+        drawings,
+        exposure,
+        labels,
+        drawing_depth,
+        beauty,
+        depth or beauty,
+        annotations,
+        palette,
+        {key: sequence for key, sequence in outputs.items() if sequence},
     )
 
 
@@ -135,11 +151,12 @@ def _find_sequence(folder: Path, pattern: str) -> FrameSequence:
     return sequence
 
 
-def _check_output(folder: Path, pattern: str | None) -> None:
-    if pattern:
-        first, second = (FrameSequence.parse(str(folder / pattern)).path(n) for n in (1, 2))
-        if first == second:
-            raise ValueError(f'want a pattern with a frame number, like "final.####.png", got "{pattern}"')
+def _output(folder: Path, pattern: str) -> FrameSequence:
+    # A folder of that name, or files that are there already, must not decide how new frames are called.
+    if not re.search(r"#|@|%0?\d*d", Path(pattern).name):
+        raise ValueError(f'want a pattern with a frame number, like "final.####.png", got "{pattern}"')
+    sequence = FrameSequence.parse(folder / pattern)
+    return FrameSequence(sequence.folder, sequence.prefix, sequence.suffix, sequence.padding, ())
 
 
 def _read_marks(folder: Path, name: str | None) -> Drawing | None:

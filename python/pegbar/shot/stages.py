@@ -95,8 +95,7 @@ class DepthStage(Stage):
     """Depth of the drawing (eq. of section 3.3.1): an EXR map in metres, and a picture to look at."""
 
     def outputs(self, frame: int) -> list[Path]:
-        out = self.shot.settings.output
-        return [self.shot.output(pattern, frame) for pattern in (out.depth, out.depth_picture) if pattern]
+        return [path for key in ("depth", "depth_picture") if (path := self.shot.output(key, frame))]
 
     def inputs(self, frame: int) -> list[Path]:
         return drawn_inputs(self.shot, frame)
@@ -124,8 +123,7 @@ class CompositeStage(Stage):
     """The drawing and the rendered passes in depth order (eqs. 16-17), and the matte that holds the render out."""
 
     def outputs(self, frame: int) -> list[Path]:
-        out = self.shot.settings.output
-        return [self.shot.output(pattern, frame) for pattern in (out.frames, out.holdout) if pattern]
+        return [path for key in ("frames", "holdout") if (path := self.shot.output(key, frame))]
 
     def inputs(self, frame: int) -> list[Path]:
         assert self.shot.beauty is not None

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from pegbar.errors import MissingFrameError
 from pegbar.io.frames import read_picture
-from pegbar.io.sequence import FrameSequence, find_sequences, format_frames
+from pegbar.io.numbers import format_frames
+from pegbar.io.sequence import FrameSequence, find_sequences
 
 # Which folder or file names say what a sequence holds; the first that fits counts, plain drawings come last.
 _KINDS = {
