@@ -11,8 +11,14 @@ __all__ = [
     "limb_depth",
     "matte",
     "palette_labels",
+    "render_passes",
+    "resolve_passes",
     "segment_stick_figure",
 ]
+
+_Floats = NDArray[np.float32]
+_Doubles = NDArray[np.float64]
+_Pictures = tuple[_Floats, _Floats, _Floats, NDArray[np.uint16]]
 
 def depth_composite(
     drawing: NDArray[np.uint8],
@@ -39,3 +45,13 @@ def has_alpha(image: NDArray[np.uint8]) -> bool: ...
 def matte(
     image: NDArray[np.uint8], mode: str, labels: NDArray[np.uint8] | None
 ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]: ...
+def render_passes(
+    geometry: tuple[_Doubles, NDArray[np.uint32], _Floats, _Doubles, NDArray[np.uint16]],
+    camera: tuple[list[list[float]], int, int],
+    near: float,
+    toon: tuple[tuple[float, float, float], _Floats],
+    ink: tuple[float, tuple[float, float, float, float], float, float],
+) -> _Pictures: ...
+def resolve_passes(
+    beauty: _Floats, depth: _Floats, coverage: _Floats, object_id: NDArray[np.uint16], factor: int
+) -> _Pictures: ...

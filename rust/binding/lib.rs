@@ -7,6 +7,7 @@ mod errors;
 mod grow;
 mod matte;
 mod palette;
+mod raster;
 mod segment;
 
 use pyo3::prelude::*;
@@ -24,6 +25,7 @@ mod _kernels {
     use crate::matte::{has_alpha, ink_alpha, matte};
     #[pymodule_export]
     use crate::palette::palette_labels;
+    use crate::raster::{render_passes, resolve_passes};
     #[pymodule_export]
     use crate::segment::segment_stick_figure;
 }

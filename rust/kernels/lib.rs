@@ -1,12 +1,21 @@
 //! The pure kernels of pegbar, one file each, without Python. This file names the modules and defines nothing.
 
+pub mod band;
+pub mod clip;
 pub mod color;
 pub mod composite;
 pub mod composite_block;
 pub mod depth;
+pub mod depth;
+pub mod error;
 pub mod error;
 pub mod grow;
+pub mod ink;
 pub mod matte;
 pub mod palette;
+pub mod raster;
+pub mod resolve;
 pub mod segment;
 mod settle;
+pub mod shade;
+pub mod surface;
