@@ -25,6 +25,7 @@ mod _kernels {
     use crate::matte::{has_alpha, ink_alpha, matte};
     #[pymodule_export]
     use crate::palette::palette_labels;
+    #[pymodule_export]
     use crate::raster::{render_passes, resolve_passes};
     #[pymodule_export]
     use crate::segment::segment_stick_figure;

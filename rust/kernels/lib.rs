@@ -6,8 +6,6 @@ pub mod color;
 pub mod composite;
 pub mod composite_block;
 pub mod depth;
-pub mod depth;
-pub mod error;
 pub mod error;
 pub mod grow;
 pub mod ink;
