@@ -41,9 +41,21 @@ def run() -> Iterator[tuple[object, ...]]:
         shot = make_shot(folder, FRAMES)
         whole, files = paired(shot)
         share = whole / files - 1
-        yield "composite 1080p, one frame", f"{whole:.0f} ms", f"files alone {files:.0f} ms", f"adds {share:.0%}", "promise 15%"
+        yield (
+            "composite 1080p, one frame",
+            f"{whole:.0f} ms",
+            f"files alone {files:.0f} ms",
+            f"adds {share:.0%}",
+            "promise 15%",
+        )
         one, two = (command(folder, jobs) for jobs in (1, 2))
-        yield f"pegbar composite, {FRAMES} frames", f"1 job {one:.1f} s", f"2 jobs {two:.1f} s", f"{one / two:.2f}x", "promise 1.7x"
+        yield (
+            f"pegbar composite, {FRAMES} frames",
+            f"1 job {one:.1f} s",
+            f"2 jobs {two:.1f} s",
+            f"{one / two:.2f}x",
+            "promise 1.7x",
+        )
 
 
 def paired(shot: Shot) -> tuple[float, float]:
@@ -85,7 +97,10 @@ def make_shot(folder: Path, count: int, width: int = WIDTH, height: int = HEIGHT
     shade = (colors * (0.8 + 0.2 * np.sin(x / 17 + y / 29))[..., None]).astype(np.uint8)
     drawing = np.dstack([shade, np.rint(alpha * 255).astype(np.uint8)])
     labels = np.where((alpha == 1)[..., None], np.maximum(colors, 1), 0).astype(np.uint8)
-    palette = [tuple(np.maximum(colors[np.argmax(limb == v) // width, np.argmax(limb == v) % width], 1).tolist()) for v in range(LIMBS)]
+    palette = [
+        tuple(np.maximum(colors[np.argmax(limb == v) // width, np.argmax(limb == v) % width], 1).tolist())
+        for v in range(LIMBS)
+    ]
     for frame in range(1, count + 1):
         write_image(folder / f"d.{frame:04d}.png", drawing)
         write_image(folder / f"l.{frame:04d}.png", labels)

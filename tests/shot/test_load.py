@@ -54,7 +54,11 @@ def test_a_wrong_line_is_named(tmp_path, line, problem):
 
 
 def test_all_problems_come_at_once(tmp_path):
-    text = GOOD.replace("hold = 2", 'hold = "twos"\nmat = "ink"').replace("#8A4B2A", "#8A4B").replace("[passes]", "[pases]")
+    text = (
+        GOOD.replace("hold = 2", 'hold = "twos"\nmat = "ink"')
+        .replace("#8A4B2A", "#8A4B")
+        .replace("[passes]", "[pases]")
+    )
     with pytest.raises(ShotError) as caught:
         load(tmp_path, text)
     found = sorted(int(problem.split(":")[1]) for problem in caught.value.problems)

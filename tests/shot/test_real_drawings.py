@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pegbar import read_annotations
-from pegbar.io.exr import read_passes, write_exr
+from pegbar.io.exr import write_exr
 from pegbar.io.frames import read_picture
 from pegbar.shot.batch import run_frames
 from pegbar.shot.drawn import read_drawn
@@ -19,27 +19,27 @@ from pegbar.shot.stages import CompositeStage
 from pegbar.simulate.passes import render_passes
 from tests.elements import ball, hoop
 
-WALKS = {"morevna_side_walk": (24, "frames/###.png", 2), "kenney_male_person_walk": (8, "malePerson_walk#.png", 4)}
+WALKS = {"morevna_side_walk": (24, "###.png", 2), "kenney_male_person_walk": (8, "malePerson_walk#.png", 4)}
 HOOP, BALL = 1, 2
 
 
 @pytest.fixture(scope="module", params=WALKS)
 def walk(request, test_data, tmp_path_factory):
-    """The finished shot of one walk, and how often each kind of crossing was met."""
+    """The finished shot of one walk, its marks, and what was rendered for each frame."""
     count, pattern, samples = WALKS[request.param]
     source = test_data / "annotated" / request.param
     folder = tmp_path_factory.mktemp(request.param)
     marks = read_annotations(source / "annotation.json")
-    drawings = marks.images[0].parent / pattern.rsplit("/", maxsplit=1)[-1]
-    write_shot(folder, source, drawings, count)
+    write_shot(folder, source, marks.images[0].parent / pattern, count)
+    rendered = []
     for frame in range(count):
         passes = render_passes(elements(marks, frame, count), marks.camera, samples=samples)
-        channels = {name: passes.beauty[..., i].astype(np.float16) for i, name in enumerate("RGBA")}
-        write_exr(folder / f"passes.{frame:04d}.exr", {**channels, "Z": passes.depth, "id": passes.object_id.astype(np.float32)})
+        write_exr(folder / f"passes.{frame:04d}.exr", {"": passes.beauty, "Z": passes.depth}, compression="none")
+        rendered.append(witnesses(passes))
     shot = open_shot(folder / "shot.toml")
     results = list(run_frames(CompositeStage(shot), list(shot.frames), jobs=1))
     assert [result.error for result in results] == [None] * count
-    return shot, marks, samples
+    return shot, marks, rendered
 
 
 def write_shot(folder, source, drawings, count):
@@ -76,11 +76,11 @@ def depths(marks, frame):
 
 
 def test_at_every_crossing_the_order_is_the_3d_order(walk):
-    shot, marks, samples = walk
+    shot, marks, rendered = walk
     met = {True: 0, False: 0}
     for frame in shot.frames:
         drawn, final = read_drawn(shot, frame), read_picture(shot.output("frames", frame)).astype(int)
-        beauty, near, far = rendered(shot, frame, samples)
+        beauty, near, far = rendered[frame]
         solid = (drawn.alpha == 1) & (beauty[..., 3] == 1)
         nearest, farthest = limb_range(shot, marks, frame)
         in_front, behind = solid & (far < nearest), solid & (near > farthest)
@@ -94,10 +94,10 @@ def test_at_every_crossing_the_order_is_the_3d_order(walk):
 
 
 def test_no_fringe_stands_round_the_figure(walk):
-    shot, _, samples = walk
+    shot, _, rendered = walk
     for frame in shot.frames:
         drawn, final = read_drawn(shot, frame), read_picture(shot.output("frames", frame)).astype(int)
-        beauty, near, far = rendered(shot, frame, samples)
+        beauty, near, _ = rendered[frame]
         soft = (drawn.alpha > 0) & (drawn.alpha < 1)
         assert soft.any()
         over = soft & (beauty[..., 3] == 1) & (near > drawn.depth)
@@ -110,18 +110,15 @@ def test_no_fringe_stands_round_the_figure(walk):
         assert not lost.any()
 
 
-def rendered(shot, frame, samples):
-    """Mean colour of a pixel's samples, and its nearest and farthest depth."""
-    passes = read_passes(shot.beauty.path(frame))
-    blocks = [
-        image.reshape(image.shape[0] // samples, samples, image.shape[1] // samples, samples, -1)
-        for image in (passes.beauty, passes.depth)
-    ]
-    beauty, depth = blocks[0], blocks[1][..., 0]
-    flat = beauty.max(axis=(1, 3)) - beauty.min(axis=(1, 3))
-    mean = beauty.mean(axis=(1, 3))
-    mean[flat.max(axis=-1) > 0, 3] *= 0.5  # mixed pixels are no clean witness of either layer
-    return mean, depth.min(axis=(1, 3)), depth.max(axis=(1, 3))
+def witnesses(passes):
+    """Mean colour of a pixel's samples, and its nearest and farthest depth; pixels of mixed samples get alpha 0.5."""
+    k = passes.samples
+    beauty, depth = (
+        np.stack([image[i::k, j::k] for i in range(k) for j in range(k)]) for image in (passes.beauty, passes.depth)
+    )
+    mean = beauty.mean(axis=0)
+    mean[(beauty != beauty[0]).any(axis=(0, 3)), 3] = 0.5
+    return mean, depth.min(axis=0), depth.max(axis=0)
 
 
 def limb_range(shot, marks, frame):

@@ -34,7 +34,9 @@ class BatchOptions:
             return list(frames)
         wanted = parse_frames(self.frames)
         if strange := sorted(set(wanted) - set(frames)):
-            raise ValueError(f"--frames: the shot has no frame {format_frames(strange)} (it has {format_frames(frames)})")
+            raise ValueError(
+                f"--frames: the shot has no frame {format_frames(strange)} (it has {format_frames(frames)})"
+            )
         return wanted
 
 

@@ -52,9 +52,7 @@ _KEYS = {
 _PATHS = {"drawings", "labels", "annotations", "drawing_depth", "beauty", "depth", "output", "holdout"}
 
 
-def composite(
-    shot: Path | None = None, files: FileOptions | None = None, options: BatchOptions | None = None
-) -> int:
+def composite(shot: Path | None = None, files: FileOptions | None = None, options: BatchOptions | None = None) -> int:
     """Composite drawing and rendered passes in depth order, frame by frame.
 
     Example: pegbar composite shot.toml --frames 1-48

@@ -143,14 +143,19 @@ def _names(folder: Path) -> list[str]:
         return []
 
 
-def _only_sequence(folder: Path) -> FrameSequence:
+def find_sequences(folder: _Path) -> list[FrameSequence]:
+    """Return the sequences of numbered pictures in ``folder`` (not in the folders below), in the order of their names."""
+    place = Path(folder)
     groups: dict[tuple[str, str], dict[int, str]] = {}
-    pictures = [name for name in _names(folder) if name.lower().endswith(_SUFFIXES)]
-    for name in pictures:
-        match = _NUMBERED.fullmatch(name)
+    for name in _names(place):
+        match = _NUMBERED.fullmatch(name) if name.lower().endswith(_SUFFIXES) else None
         if match:
-            _add(groups.setdefault((match["prefix"], match["suffix"]), {}), folder, int(match["number"]), name)
-    sequences = [_sequence(folder, prefix, suffix, found) for (prefix, suffix), found in groups.items()]
+            _add(groups.setdefault((match["prefix"], match["suffix"]), {}), place, int(match["number"]), name)
+    return [_sequence(place, prefix, suffix, found) for (prefix, suffix), found in groups.items()]
+
+
+def _only_sequence(folder: Path) -> FrameSequence:
+    sequences = find_sequences(folder)
     if len(sequences) == 1:
         return sequences[0]
     if sequences:

@@ -21,7 +21,12 @@ def over_paper(picture: Picture, paper: tuple[int, int, int] = (255, 255, 255)) 
 
 
 def contact_sheet(
-    pictures: Sequence[Picture], *, columns: int, width: int = 320, gap: int = 4, paper: tuple[int, int, int] = (255, 255, 255)
+    pictures: Sequence[Picture],
+    *,
+    columns: int,
+    width: int = 320,
+    gap: int = 4,
+    paper: tuple[int, int, int] = (255, 255, 255),
 ) -> Picture:
     """Return ``pictures`` (each (H, W, 3|4) uint8, one size) in rows of ``columns``, each ``width`` pixels wide.
 

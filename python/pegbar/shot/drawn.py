@@ -12,7 +12,7 @@ from pegbar.errors import DegenerateError
 from pegbar.io.exr import read_passes
 from pegbar.io.frames import read_picture
 from pegbar.layer.depth import limb_depth
-from pegbar.layer.matte import matte
+from pegbar.layer.matte import ink_alpha, matte
 from pegbar.layer.segmentation import grow_labels, palette_labels, segment_stick_figure
 from pegbar.shot.plan import Shot
 
@@ -61,7 +61,9 @@ def read_drawn(shot: Shot, frame: int) -> Drawn:
         )
     grown = grow_labels(labels, layer.alpha > 0, reach=settings.reach)
     ends, end_depths = limb_ends(shot, frame, grown)
-    return Drawn(layer.color, layer.alpha, limb_depth(grown, ends, end_depths, interpolation=settings.interpolation), notes)
+    return Drawn(
+        layer.color, layer.alpha, limb_depth(grown, ends, end_depths, interpolation=settings.interpolation), notes
+    )
 
 
 def limb_ends(shot: Shot, frame: int, labels: NDArray[np.uint8]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -77,16 +79,15 @@ def limb_ends(shot: Shot, frame: int, labels: NDArray[np.uint8]) -> tuple[NDArra
     index, pairs = shot.annotation_index(frame), marks.limb_markers
     ends, depths = marks.markers[index][pairs], marks.depths[index][pairs]
     missing = ~(np.isfinite(ends).all(axis=2) & np.isfinite(depths))
-    shown = np.flatnonzero(np.bincount(labels.ravel(), minlength=len(pairs) + 1)[1:])
-    for limb in shown[missing[shown].any(axis=1)]:
-        marker = marks.names[pairs[limb][int(np.argmax(missing[limb]))]]
-        raise DegenerateError(f"frame {frame}: limb {marks.limbs[limb].name}: marker {marker} has no place or no depth")
+    for limb in np.flatnonzero(missing.any(axis=1)):
+        if (labels == limb + 1).any():
+            marker = marks.names[pairs[limb][int(np.argmax(missing[limb]))]]
+            name = marks.limbs[limb].name
+            raise DegenerateError(f"frame {frame}: limb {name}: marker {marker} has no place or no depth")
     return np.where(missing[..., None], 0.0, ends), np.where(missing, 1.0, depths)
 
 
-def _labels(
-    shot: Shot, frame: int, picture: NDArray[np.uint8]
-) -> tuple[NDArray[np.uint8] | None, tuple[str, ...]]:
+def _labels(shot: Shot, frame: int, picture: NDArray[np.uint8]) -> tuple[NDArray[np.uint8] | None, tuple[str, ...]]:
     settings = shot.settings.drawing
     if shot.labels is not None:
         return _painted_labels(shot, frame, picture)
@@ -98,9 +99,7 @@ def _labels(
     return None, ()
 
 
-def _painted_labels(
-    shot: Shot, frame: int, picture: NDArray[np.uint8]
-) -> tuple[NDArray[np.uint8], tuple[str, ...]]:
+def _painted_labels(shot: Shot, frame: int, picture: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], tuple[str, ...]]:
     assert shot.labels is not None
     path = shot.labels.path(shot.exposure.drawing(frame))
     painted = read_picture(path)
@@ -108,20 +107,15 @@ def _painted_labels(
     palette, tolerance = shot.palette, shot.settings.drawing.tolerance
     if not len(palette.colors):
         raise ValueError(f"frame {frame}: no limb colours: the annotations' limbs have none and there is no palette")
-    found = palette_labels(
-        painted, palette.colors, palette.labels, tolerance=tolerance, background=palette.background
-    )
-    if not found.unmatched or found.first_unmatched is None:
+    found = palette_labels(painted, palette.colors, palette.labels, tolerance=tolerance, background=palette.background)
+    if found.first_unmatched is None or found.first_unmatched_color is None:
         return found.labels, ()
-    row, column = found.first_unmatched
-    color = "#" + bytes(painted[row, column, :3]).hex()
+    (row, column), color = found.first_unmatched, "#" + bytes(found.first_unmatched_color[:3]).hex()
     note = f"frame {frame}: {path}: {found.unmatched} pixels match no limb, first {color} at row {row}, column {column}"
     return found.labels, (note,)
 
 
 def _gray_over_white(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    from pegbar.layer.matte import ink_alpha
-
     return np.rint(255 - 255 * ink_alpha(picture)).astype(np.uint8)
 
 
