@@ -1,0 +1,20 @@
+"""Fixtures that several rooms' tests share."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture(scope="session")
+def test_data() -> Path:
+    """The folder of real clips and drawings; skips where it is missing, fails where it is required."""
+    folder = Path(os.environ.get("PEGBAR_TEST_DATA", ROOT.parent / "shared" / "data"))
+    if not (folder / "INDEX.csv").is_file():
+        reason = f"no real data: PEGBAR_TEST_DATA points to {folder}"
+        (pytest.fail if os.environ.get("PEGBAR_REQUIRE_TEST_DATA") else pytest.skip)(reason)
+    return folder
