@@ -6,10 +6,11 @@ import math
 import os
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from pegbar import arrays
 from pegbar.io import atomic
@@ -42,7 +43,7 @@ def write_animation(path: str | os.PathLike[str], frames: Iterable[ArrayLike], f
         raise ValueError(f"path: want a suffix of {', '.join(_SUFFIXES)}, got {suffix!r}")
     if not 0 < frame_rate < math.inf:
         raise ValueError(f"frame_rate: want frames a second above 0, got {frame_rate}")
-    pictures = []
+    pictures: list[NDArray[Any]] = []
     for index, frame in enumerate(frames):
         picture = arrays.image(f"frames[{index}]", frame)
         if pictures:
@@ -52,7 +53,7 @@ def write_animation(path: str | os.PathLike[str], frames: Iterable[ArrayLike], f
         raise ValueError("frames: want at least one")
     animation = cv2.Animation()
     animation.frames = pictures
-    animation.durations = _durations(len(pictures), frame_rate, 10 if suffix == ".gif" else 1)
+    animation.durations = _durations(len(pictures), frame_rate, 10 if suffix == ".gif" else 1).tolist()
     options = [cv2.IMWRITE_WEBP_QUALITY, 101] if suffix == ".webp" else []
     good, encoded = cv2.imencodeanimation(".png" if suffix == ".apng" else suffix, animation, options)
     if not good:
@@ -60,7 +61,7 @@ def write_animation(path: str | os.PathLike[str], frames: Iterable[ArrayLike], f
     atomic.write_bytes(path, encoded.data)
 
 
-def _durations(count: int, frame_rate: float, step: int) -> np.ndarray[tuple[int], np.dtype[np.int32]]:
+def _durations(count: int, frame_rate: float, step: int) -> NDArray[np.int32]:
     """Milliseconds of each frame, multiples of ``step``, whose sums follow the true times."""
     times = np.rint(np.arange(count + 1) * (1000 / frame_rate / step)) * step
-    return np.maximum(np.diff(times), step).astype(np.int32)
+    return np.asarray(np.maximum(np.diff(times), step), np.int32)

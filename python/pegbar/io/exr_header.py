@@ -7,6 +7,7 @@ https://openexr.com/en/latest/OpenEXRFileLayout.html
 
 from __future__ import annotations
 
+import math
 import mmap
 import os
 import struct
@@ -19,7 +20,7 @@ from pegbar.io.structure import check_size
 
 _Path = str | os.PathLike[str]
 _TILED, _DEEP, _MULTIPART = 0x200, 0x800, 0x1000
-# Rows of one chunk by compression: none, rle, zips, zip, piz, pxr24, b44, b44a, dwaa, dwab, htj2k256, htj2k32, zstd.
+# Rows of one chunk by compression: none, rle, zips, zip, piz, pxr24, b44, b44a, dwaa, dwab, htj2k256, htj2k32.
 _ROWS = (1, 1, 1, 16, 32, 16, 32, 32, 32, 256, 256, 32)
 _TYPES = ("uint32", "float16", "float32")
 
@@ -121,7 +122,10 @@ def _channels(path: _Path, data: bytes) -> dict[str, str]:
     while data[place] != 0:
         end = data.find(b"\0", place)
         kind, _, across, down = struct.unpack_from("<IIII", data, end + 1)
-        name = data[place:end].decode("utf-8", "replace")
+        try:
+            name = data[place:end].decode("utf-8")
+        except UnicodeDecodeError:
+            raise FormatError(path, "the EXR's header is damaged: a channel whose name is no text") from None
         if kind >= len(_TYPES):
             raise FormatError(path, f"the EXR's channel {name} has type {kind}, which does not exist")
         if (across, down) != (1, 1):
@@ -142,13 +146,13 @@ def _chunk_count(path: _Path, attributes: dict[str, bytes], part: Part, tiled: b
         return _tile_count(attributes, right - left + 1, bottom - top + 1)
     method = attributes["compression"][0]
     rows = _ROWS[method] if method < len(_ROWS) else 1 << 20
-    return -(-(bottom - top + 1) // rows)
+    return math.ceil((bottom - top + 1) / rows)
 
 
 def _tile_count(attributes: dict[str, bytes], width: int, height: int) -> int:
     """Tiles of the largest level, which stand first in the table."""
-    across, down = struct.unpack_from("<II", attributes.get("tiles", b""))
-    return -(-width // max(across, 1)) * -(-height // max(down, 1))
+    sides: tuple[int, int] = struct.unpack_from("<II", attributes.get("tiles", b""))
+    return math.ceil(width / max(sides[0], 1)) * math.ceil(height / max(sides[1], 1))
 
 
 def _check_chunks(path: _Path, data: mmap.mmap, place: int, count: int, tiled: bool, multipart: bool) -> None:

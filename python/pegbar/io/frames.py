@@ -100,22 +100,23 @@ def read_picture(path: _Path) -> NDArray[np.uint8]:
         raise FormatError(path, str(error).removeprefix("image: ")) from None
     if pixels.shape[2] == 1:
         pixels = np.asarray(cv2.cvtColor(pixels, cv2.COLOR_GRAY2RGB), np.uint8)
-    return pixels
+    return np.asarray(pixels, np.uint8)
 
 
 def to_uint8(image: ArrayLike) -> NDArray[np.uint8]:
     """Round a picture (..., C) to eight bits: uint16 from 0..65535, floats from 0..1 (what is outside is clipped)."""
     array = np.asarray(image)
     if array.dtype == np.uint8:
-        return np.ascontiguousarray(array)
+        return np.ascontiguousarray(array, np.uint8)
     if array.dtype == np.uint16:
         # x / 257 is never halfway between two whole numbers, so how ties are rounded does not matter.
-        return np.asarray(cv2.convertScaleAbs(array, alpha=1 / 257), np.uint8).reshape(array.shape)
+        rounded: NDArray[np.uint8] = np.asarray(cv2.convertScaleAbs(array, alpha=1 / 257), np.uint8)
+        return rounded.reshape(array.shape)
     if array.dtype.kind != "f":
         raise ValueError(f"image: want uint8, uint16 or float, got dtype {array.dtype}")
     if np.isnan(np.min(array, initial=0)):
         raise ValueError(f"image: NaN at {np.argwhere(np.isnan(array))[0].tolist()}")
-    return np.rint(np.clip(array, 0, 1) * 255).astype(np.uint8)
+    return np.asarray(np.rint(np.clip(array, 0, 1) * 255), np.uint8)
 
 
 def write_image(path: _Path, image: ArrayLike) -> None:

@@ -105,6 +105,15 @@ class FrameSequence:
             raise MissingFrameError(f"{self.pattern}: missing {format_frames(missing)}")
 
 
+def find_sequences(folder: _Path) -> list[FrameSequence]:
+    """Return the sequences of pictures in ``folder`` and the folders below it, hidden ones left out, by name."""
+    sequences = []
+    for place, below, _ in os.walk(folder):
+        below[:] = sorted(name for name in below if not name.startswith("."))
+        sequences += _sequences_in(Path(place))
+    return sequences
+
+
 def _format(number: int, padding: int) -> str:
     return f"{number:0{padding + (number < 0)}d}"
 
@@ -143,19 +152,8 @@ def _names(folder: Path) -> list[str]:
         return []
 
 
-def find_sequences(folder: _Path) -> list[FrameSequence]:
-    """Return the sequences of numbered pictures in ``folder`` (not in the folders below), in the order of their names."""
-    place = Path(folder)
-    groups: dict[tuple[str, str], dict[int, str]] = {}
-    for name in _names(place):
-        match = _NUMBERED.fullmatch(name) if name.lower().endswith(_SUFFIXES) else None
-        if match:
-            _add(groups.setdefault((match["prefix"], match["suffix"]), {}), place, int(match["number"]), name)
-    return [_sequence(place, prefix, suffix, found) for (prefix, suffix), found in groups.items()]
-
-
 def _only_sequence(folder: Path) -> FrameSequence:
-    sequences = find_sequences(folder)
+    sequences = _sequences_in(folder)
     if len(sequences) == 1:
         return sequences[0]
     if sequences:
@@ -163,6 +161,15 @@ def _only_sequence(folder: Path) -> FrameSequence:
         more = f" and {len(sequences) - 8} more" if len(sequences) > 8 else ""
         raise FormatError(folder, f"holds several sequences, name one: {names}{more}")
     raise FormatError(folder, f"holds no numbered pictures ({', '.join(_SUFFIXES)})")
+
+
+def _sequences_in(folder: Path) -> list[FrameSequence]:
+    groups: dict[tuple[str, str], dict[int, str]] = {}
+    for name in _names(folder):
+        match = _NUMBERED.fullmatch(name)
+        if match and match["suffix"].lower() in _SUFFIXES:
+            _add(groups.setdefault((match["prefix"], match["suffix"]), {}), folder, int(match["number"]), name)
+    return [_sequence(folder, prefix, suffix, found) for (prefix, suffix), found in groups.items()]
 
 
 def _single_file(path: Path) -> FrameSequence:
