@@ -40,10 +40,14 @@ def test_closing_early_ends_the_workers(tmp_path):
 
 
 def test_workers_end_when_the_parent_is_killed(tmp_path):
-    code = (
-        "from pathlib import Path; from pegbar.shot.batch import run_frames; from tests.shot.tasks import Slow\n"
-        f"if __name__ == '__main__':\n  for r in run_frames(Slow(Path({str(tmp_path)!r})), list(range(500)), jobs=2): print(1, flush=True)"
-    )
+    code = f"""
+from pathlib import Path
+from pegbar.shot.batch import run_frames
+from tests.shot.tasks import Slow
+if __name__ == "__main__":
+    for _ in run_frames(Slow(Path({str(tmp_path)!r})), list(range(500)), jobs=2):
+        print(1, flush=True)
+"""
     script = tmp_path.with_suffix(".py")
     script.write_text(code)
     environment = {**os.environ, "PYTHONPATH": os.getcwd()}

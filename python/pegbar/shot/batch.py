@@ -12,7 +12,7 @@ import os
 import signal
 import sys
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
@@ -37,7 +37,7 @@ class FrameResult:
     error: str | None = None
 
 
-def run_frames(task: Task, frames: list[int], *, jobs: int | None = None) -> Iterator[FrameResult]:
+def run_frames(task: Task, frames: list[int], *, jobs: int | None = None) -> Generator[FrameResult]:
     """Yield a result a frame, as they are finished.
 
     ``jobs`` is the number of worker processes (None: one a core); with one job or one frame the work is done here.
@@ -95,9 +95,9 @@ class _Pool:
                 busy[pipe] = frames.popleft()
                 with suppress(ConnectionError):
                     pipe.send(busy[pipe])
-            for pipe in wait(list(busy)):
-                assert isinstance(pipe, Connection)
-                frame = busy.pop(pipe)
+            for ready in wait(list(busy)):
+                assert isinstance(ready, Connection)
+                pipe, frame = ready, busy.pop(ready)
                 try:
                     result = pipe.recv()
                 except (EOFError, ConnectionError):

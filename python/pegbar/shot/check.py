@@ -19,14 +19,12 @@ class CheckStage:
 
     def __call__(self, frame: int, /) -> tuple[str, ...]:
         """Return the problems of ``frame``."""
-        problems = [*self._marks(frame)]
+        problems, drawn = self._marks(frame), None
         try:
             drawn = read_drawn(self.shot, frame)
-        except (ValueError, OSError) as error:
-            drawn = None
-            problems.append(_in_frame(frame, error))
-        else:
             problems += drawn.notes
+        except (ValueError, OSError) as error:
+            problems.append(_in_frame(frame, error))
         if self.shot.beauty is not None:
             try:
                 stage = CompositeStage(self.shot)

@@ -40,7 +40,7 @@ class ShotSection(Section):
 
     name: str | None = None
     frames: str | None = None
-    frame_rate: float = Field(24.0, gt=0, allow_inf_nan=False)
+    frame_rate: float = Field(default=24.0, gt=0, allow_inf_nan=False)
     size: tuple[Annotated[int, Field(gt=0)], Annotated[int, Field(gt=0)]] | None = None
 
 
@@ -114,8 +114,8 @@ class OutputSection(Section):
 class ShotFile(Section):
     """A whole shot file. Later steps add sections."""
 
-    shot: ShotSection = ShotSection()
+    shot: ShotSection = Field(default_factory=ShotSection)
     drawing: DrawingSection
     camera: CameraSection | None = None
     passes: PassesSection | None = None
-    output: OutputSection = OutputSection()
+    output: OutputSection = Field(default_factory=OutputSection)

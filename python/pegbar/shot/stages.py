@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pegbar.io.atomic import clean_leftovers
 from pegbar.io.exr import read_passes, write_exr
 from pegbar.io.frames import read_image, write_image
-from pegbar.layer.composite import depth_composite, holdout_matte
+from pegbar.layer.composite import Space, depth_composite, holdout_matte
 from pegbar.report.depth_picture import depth_picture
 from pegbar.shot.drawn import Drawn, drawn_inputs, read_drawn
 from pegbar.shot.plan import Shot
@@ -158,7 +158,7 @@ class CompositeStage(Stage):
             write_image(holdout[0], np.rint(kept * 255).astype(np.uint8)[..., None])
         return drawn.notes
 
-    def read_rendered(self, frame: int) -> tuple[NDArray[Any], NDArray[np.float32], str]:
+    def read_rendered(self, frame: int) -> tuple[NDArray[Any], NDArray[np.float32], Space]:
         """Read the rendered passes: beauty, depth in metres, and the space of the beauty's colours."""
         shot, settings = self.shot, self.shot.settings.passes
         assert settings is not None
@@ -178,8 +178,8 @@ class CompositeStage(Stage):
         assert depth is not None
         if settings.metres != 1.0:
             depth = depth * np.float32(settings.metres)
-        space = settings.space if settings.space != "auto" else "linear" if is_exr else "display"
-        return beauty, depth, space
+        by_file: Space = "linear" if is_exr else "display"
+        return beauty, depth, by_file if settings.space == "auto" else settings.space
 
 
 def check_passes(frame: int, path: Path, drawn: Drawn, beauty: NDArray[Any], depth: NDArray[Any]) -> None:

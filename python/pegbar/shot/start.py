@@ -25,8 +25,7 @@ def start_shot(folder: Path) -> str:
     ValueError where several could be the drawings.
     """
     found: dict[str, list[FrameSequence]] = {"drawings": [], **{kind: [] for kind in _KINDS}}
-    below = sorted(path for path in folder.iterdir() if path.is_dir() and not path.name.startswith("."))
-    for sequence in (sequence for place in (folder, *below) for sequence in find_sequences(place)):
+    for sequence in find_sequences(folder):
         found[_kind(sequence, folder)].append(sequence)
     if not found["drawings"]:
         raise MissingFrameError(f"{folder}: no sequence of drawn frames (numbered pictures) here")
