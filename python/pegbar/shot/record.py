@@ -61,4 +61,4 @@ def _unchanged(entry: list[Any]) -> bool:
     now = path.stat()
     if now.st_size != entry[1]:
         return False
-    return now.st_mtime_ns == entry[2] or fingerprint(path)[3] == entry[3]
+    return bool(now.st_mtime_ns == entry[2] or fingerprint(path)[3] == entry[3])

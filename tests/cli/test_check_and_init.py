@@ -1,0 +1,79 @@
+import numpy as np
+import pytest
+
+from pegbar.cli.main import main
+from pegbar.io.frames import write_image
+from tests.shots import draw, make_shot
+
+
+def run(*arguments):
+    return main([str(argument) for argument in arguments])
+
+
+def test_a_sound_shot_has_no_problem(tmp_path, capsys):
+    shot = make_shot(tmp_path)
+    before = sorted(tmp_path.rglob("*"))
+    assert run("check", shot) == 0
+    assert "4 frames read, no problems" in capsys.readouterr().out
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_every_problem_is_reported_at_once(tmp_path, capsys):
+    shot = make_shot(tmp_path)
+    (tmp_path / "d.0001.png").write_bytes(b"not a picture")
+    labels = draw(2)[1]
+    labels[0, 0] = (7, 7, 7)
+    write_image(tmp_path / "l.0002.png", labels)
+    (tmp_path / "p.0003.exr").unlink()
+    marks = tmp_path / "marks.json"
+    marks.write_text(marks.read_text().replace("[40, 27]", "[400, 27]"))
+    assert run("check", shot) == 1
+    captured = capsys.readouterr()
+    lines = captured.err.splitlines()
+    assert "4 frames read, 4 problems" in captured.out
+    for frame, words in {1: "d.0001.png", 2: "1 pixels match no limb", 3: "p.0003.exr", 4: "left_hand"}.items():
+        assert [line for line in lines if line.startswith(f"frame {frame}: ") and words in line], (frame, lines)
+
+
+def test_problems_of_the_shot_file_itself_come_with_lines(tmp_path, capsys):
+    shot = make_shot(tmp_path)
+    text = shot.read_text().replace('"d.####.png"', '"e.####.png"').replace('"marks.json"', '"none.json"')
+    shot.write_text(text + '[drawing.palette]\n"#ff0000" = "tail"\n')
+    assert run("check", shot) == 1
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 3
+    assert f"{shot}:6: drawing.frames: " in lines[0]
+    assert f"{shot}:8: drawing.annotations: " in lines[1]
+    assert f"{shot}:18: drawing.palette: " in lines[2]
+    assert '"tail"' in lines[2]
+
+
+def test_init_writes_a_shot_that_works(tmp_path, capsys):
+    make_shot(tmp_path).unlink()
+    assert run("init", tmp_path) == 0
+    text = (tmp_path / "shot.toml").read_text()
+    assert 'frames = "1-4"' in text
+    assert "size = [48, 32]" in text
+    assert run("check", tmp_path / "shot.toml") == 0
+    assert run("composite", tmp_path / "shot.toml") == 0
+    assert (tmp_path / "final/final.0004.png").is_file()
+    capsys.readouterr()
+    assert run("init", tmp_path) == 2
+    assert "is there already" in capsys.readouterr().err
+    assert run("init", tmp_path, "--overwrite") == 0
+
+
+def test_init_says_what_it_cannot_find(tmp_path, capsys):
+    assert run("init", tmp_path / "none") == 2
+    assert run("init", tmp_path) == 2
+    assert "no sequence of drawn frames" in capsys.readouterr().err
+    for name in ("walk", "run"):
+        write_image(tmp_path / f"{name}.0001.png", np.zeros((4, 4, 3), np.uint8))
+    assert run("init", tmp_path) == 2
+    assert "several sequences" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["init", "check", "depth", "composite", "demo"])
+def test_every_command_has_help_with_an_example(command, capsys):
+    assert run(command, "--help") == 0
+    assert f"Example: pegbar {command}" in " ".join(capsys.readouterr().out.split())
