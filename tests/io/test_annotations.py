@@ -1,5 +1,7 @@
 import json
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -284,3 +286,13 @@ def test_a_drawing_that_does_not_fit_is_not_written(changes, problem, tmp_path):
     with pytest.raises(ValueError, match=problem):
         write_annotations(tmp_path / "a.json", drawing)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_reading_marks_loads_no_picture_library():
+    script = (
+        "import sys, pegbar, pegbar.io.sequence, pegbar.io.exposure\n"
+        "pegbar.read_annotations, pegbar.write_annotations\n"
+        "print([name for name in ('cv2', 'OpenEXR', 'yaml', 'scipy') if name in sys.modules])"
+    )
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=60)
+    assert run.stdout == "[]\n"

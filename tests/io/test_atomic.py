@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pegbar.io.annotations_writer import write_annotations
 from pegbar.io.animation import write_animation
+from pegbar.io.annotations_writer import write_annotations
 from pegbar.io.atomic import clean_leftovers, complete_file, write_bytes
 from pegbar.io.bvh import write_bvh
 from pegbar.io.exr import write_exr
@@ -41,12 +41,17 @@ def test_a_block_that_fails_leaves_what_was_there(error, old, tmp_path):
     target = tmp_path / "final.0001.png"
     if old:
         target.write_bytes(old)
-    with pytest.raises(error), complete_file(target) as part:
-        assert part.parent == tmp_path
-        assert part.suffix == ".png"
-        assert part.name.startswith(".")
-        part.write_bytes(b"half")
-        raise error
+
+    def fail():
+        with complete_file(target) as part:
+            assert part.parent == tmp_path
+            assert part.suffix == ".png"
+            assert part.name.startswith(".")
+            part.write_bytes(b"half")
+            raise error
+
+    with pytest.raises(error):
+        fail()
     assert [file.read_bytes() for file in tmp_path.iterdir()] == ([old] if old else [])
 
 
