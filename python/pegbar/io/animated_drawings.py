@@ -57,7 +57,7 @@ def parse(path: _Path, content: str) -> Drawing:
         line = None if error.problem_mark is None else error.problem_mark.line + 1
         raise FormatError(path, f"not YAML: {error.problem}", line=line) from None
     except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise FormatError(path, f"not YAML: {error}") from None
+        raise FormatError(path, f"not YAML: {' '.join(str(error).split())}") from None
     try:
         return _drawing(Path(path).parent, value)
     except Misplaced as problem:
@@ -70,6 +70,8 @@ def _drawing(folder: Path, value: Any) -> Drawing:
     size = tuple(whole(value[side], (side,), low=1, high=1 << 20) for side in ("width", "height"))
     joints, parents = _joints(value["skeleton"])
     points = {_RENAMED.get(name, name): point for name, point in joints.items() if name != "root"}
+    if not points:
+        raise Misplaced(("skeleton",), "no joint besides the root")
     if {"pelvis", "neck"} <= points.keys():
         points["chest"] = body.midpoint(points, "pelvis", "neck")
     names = tuple(name for name in body.MARKERS if name in points)
@@ -106,8 +108,6 @@ def _joints(value: Any) -> tuple[dict[str, Any], dict[str, str | None]]:
         if parent is not None and parent not in joints:
             raise Misplaced((*place, "parent"), f"no joint before it is called {parent!r}")
         joints[name], parents[name] = table(joint["loc"], (*place, "loc"), (2,)), parent
-    if not joints:
-        raise Misplaced(("skeleton",), "want at least one joint")
     return joints, parents
 
 

@@ -115,7 +115,7 @@ def check_tiff(path: _Path, data: bytes) -> None:
     try:
         big = struct.unpack_from(order + "H", data, 2)[0] == 43
         tags = _tiff_tags(data, order, big)
-    except struct.error:
+    except (struct.error, OverflowError):
         raise FormatError(path, "the TIFF is cut short", byte=len(data)) from None
     if 256 not in tags or 257 not in tags:
         raise FormatError(path, "the TIFF has no size")
