@@ -3,6 +3,7 @@
 mod arrays;
 mod depth;
 mod errors;
+mod paint;
 
 use pyo3::prelude::*;
 
@@ -11,4 +12,6 @@ use pyo3::prelude::*;
 mod _kernels {
     #[pymodule_export]
     use crate::depth::limb_depth;
+    #[pymodule_export]
+    use crate::paint::{fill_polygon, stroke_polyline, unpremultiply};
 }

@@ -2,3 +2,4 @@
 
 pub mod depth;
 pub mod error;
+pub mod paint;

@@ -1,0 +1,1 @@
+"""Pictures and sheets that show people what came out."""
