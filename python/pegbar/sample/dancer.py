@@ -47,7 +47,7 @@ _ROOT = [
     (-0.08, 0.87, -0.01),
 ]
 _PELVIS = [(0, 6, 4), (12, 2, 1), (22, -2, -5), (8, 3, 0), (-8, 9, 5), (-18, 2, -1), (-26, -4, 5), (-12, 2, 0)]
-_CHEST = [(-6, 6, 7), (14, 2, 2), (42, -8, -10), (10, 4, 0), (-30, 20, 8), (-32, 2, 0), (-50, -6, 10), (-22, -6, 2)]
+_CHEST = [(-6, 6, 7), (14, 2, 2), (42, -8, -10), (10, 4, 0), (-30, 13, 6), (-32, 2, 0), (-50, -6, 10), (-22, -6, 2)]
 _HEAD = [(8, 0, -8), (8, -4, 4), (20, -10, 12), (0, 4, 2), (-2, -6, 8), (-10, 2, 0), (-22, -12, -12), (-4, -2, -4)]
 # Directions of upper arm and forearm in the chest's axes, x outward on either side.
 _ARMS = {
@@ -56,16 +56,16 @@ _ARMS = {
         ((0.95, 0.10, 0.25), (0.85, 0.35, 0.45)),
         ((0.65, -0.62, -0.50), (-0.05, -0.80, -0.62)),
         ((0.70, -0.70, 0.10), (0.60, -0.40, 0.60)),
-        ((0.20, 0.00, 1.00), (0.05, 0.15, 1.00)),
-        ((0.70, 0.30, 0.65), (0.50, 0.80, 0.40)),
-        ((0.15, -0.15, 0.95), (-0.80, 0.25, 0.55)),
-        ((0.60, 0.35, 0.70), (0.10, 0.95, 0.40)),
+        ((0.62, 0.12, 0.85), (0.50, 0.42, 0.85)),
+        ((0.75, 0.05, 0.65), (0.65, 0.30, 0.70)),
+        ((0.30, -0.55, 0.80), (-0.80, -0.05, 0.55)),
+        ((0.85, -0.30, 0.55), (0.85, 0.05, 0.60)),
     ],
     "right": [
         ((0.90, -0.40, 0.10), (0.95, -0.15, 0.25)),
         ((0.75, -0.20, 0.60), (0.35, 0.05, 0.90)),
-        ((0.20, -0.20, 0.95), (-0.75, 0.35, 0.55)),
-        ((0.70, 0.35, 0.60), (0.35, 0.85, 0.45)),
+        ((0.35, -0.55, 0.75), (-0.75, 0.10, 0.60)),
+        ((0.90, -0.20, 0.45), (0.80, 0.30, 0.60)),
         ((0.75, 0.65, -0.15), (0.45, 0.90, -0.05)),
         ((1.00, 0.10, -0.15), (0.95, 0.25, 0.00)),
         ((0.60, -0.60, -0.55), (-0.10, -0.75, -0.65)),
@@ -151,7 +151,7 @@ def _run(keys: object, times: Floats) -> Floats:
 def _dwell(times: Floats, late: float = 0.0) -> Floats:
     """Times that go slowly around each beat and fast between, ``late`` frames behind."""
     turn = 2 * np.pi / BEAT
-    return times - late - 0.55 / turn * np.sin(turn * (times - late))
+    return times - late - 0.4 / turn * np.sin(turn * (times - late))
 
 
 def _trunk(times: Floats) -> dict[str, Floats]:
@@ -216,3 +216,21 @@ def _foot(side: str, times: Floats) -> tuple[Floats, Floats]:
     grounded = np.where(airborne, heels[0, 0], phase)
     pitch = np.where(airborne, travel[:, 3], heel(grounded))
     return np.asarray(STANCE[side] + travel[:, :3]), pitch
+
+
+def pony_tail(times: Floats, root: tuple[float, float, float], joints: int = 8) -> Floats:
+    """Points (F, n, 3) of the hair that trails the drawn head: each follows where the one before it was."""
+    head = NAMES.index("head")
+    base, _ = pose(times, 1.0)
+    chain = np.empty((len(times), joints, 3))
+    for number in range(joints):
+        places, frames = pose(times - 1.1 * number, 1.0)
+        anchor = places[:, head] + frames[:, head] @ np.array(root)
+        back = -frames[:, head, :, 2]
+        if number == 0:
+            chain[:, 0] = anchor
+            continue
+        lag = anchor - (base[:, head] + pose(times, 1.0)[1][:, head] @ np.array(root))
+        fall = 1.15 * back * 0.8**number + np.array([0.0, -0.3 - 0.22 * number, 0.0]) + 2.4 * lag
+        chain[:, number] = chain[:, number - 1] + 0.055 * unit(fall)
+    return chain

@@ -20,10 +20,10 @@ _MIDDLE = {
     "pelvis": ("", (0.0, 0.0, 0.0)),
     "chest": ("pelvis", (0.0, 0.22, -0.005)),
     "neck": ("chest", (0.0, 0.235, 0.0)),
-    "head": ("neck", (0.0, 0.18, 0.02)),
+    "head": ("neck", (0.0, 0.172, 0.02)),
 }
 _LEFT = {
-    "shoulder": ("chest", (0.155, 0.195, 0.0)),
+    "shoulder": ("chest", (0.148, 0.19, 0.0)),
     "elbow": ("shoulder", (UPPER_ARM, 0.0, 0.0)),
     "hand": ("elbow", (FOREARM, 0.0, 0.0)),
     "finger": ("hand", (HAND, 0.0, 0.0)),
