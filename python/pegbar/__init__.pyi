@@ -3,6 +3,8 @@ from .errors import FormatError as FormatError
 from .errors import MissingFrameError as MissingFrameError
 from .errors import PegbarError as PegbarError
 from .errors import ShotError as ShotError
+from .io.annotations import read_annotations as read_annotations
+from .io.annotations_writer import write_annotations as write_annotations
 from .layer.depth import limb_depth as limb_depth
 from .scene.camera import PerspectiveCamera as PerspectiveCamera
 from .scene.drawing import Drawing as Drawing

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,9 +30,11 @@ class Drawing:
     """A drawn sequence with F frames, N markers and V limbs. Pixels are (x, y), pixel centres at integers.
 
     ``markers`` (F, N, 2) float and ``visible`` (F, N) bool go with ``names`` (a marker that is not visible may be
-    NaN); ``boxes`` (F, V, 4, 2) are oriented limb boxes, ``depths`` (F, N) planar depths in metres for ``cameras``,
-    one a frame. ``images`` and ``segmentations`` are the files, empty where none are named. ``notes`` keeps what
-    the file says besides, as text.
+    NaN); ``boxes`` (F, V, 4, 2) are oriented limb boxes, ``extents`` (F, V, 4) the first and last column and row of
+    every limb's visible pixels as (left, top, right, bottom), both NaN where a limb is not visible; ``depths`` (F, N)
+    are planar depths in metres for ``cameras``, one a frame. ``images``, ``segmentations`` (limb colours) and
+    ``masks`` (the figure) are the files, empty where none are named. ``holds`` says for how many film frames each
+    drawing is shown (empty: one). ``loops`` is true for a cycle. ``notes`` keeps what the file says besides, as text.
     """
 
     names: tuple[str, ...]
@@ -45,6 +49,10 @@ class Drawing:
     cameras: tuple[PerspectiveCamera, ...] = ()
     depths: NDArray[np.float64] | None = None
     loops: bool = False
+    extents: NDArray[np.float64] | None = None
+    masks: tuple[Path, ...] = ()
+    holds: tuple[int, ...] = ()
+    notes: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def camera(self) -> PerspectiveCamera | None:

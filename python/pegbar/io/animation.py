@@ -1,0 +1,66 @@
+"""A looping animation in one file that a browser plays: APNG, WebP or GIF."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterable
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pegbar import arrays
+from pegbar.io import atomic
+
+_SUFFIXES = (".png", ".apng", ".webp", ".gif")
+_TO_BGRA = {3: cv2.COLOR_RGB2BGRA, 4: cv2.COLOR_RGBA2BGRA}
+
+
+def write_animation(path: str | os.PathLike[str], frames: Iterable[ArrayLike], frame_rate: float) -> None:
+    """Write pictures as an animation that repeats for ever, complete or not at all.
+
+    Parameters
+    ----------
+    path : path
+        .png or .apng (APNG, exact), .webp (lossless) or .gif (256 colours, alpha on or off).
+    frames : iterable of (H, W, 3|4) uint8
+        RGB or straight RGBA pictures of one size. All are held in memory.
+    frame_rate : float
+        Frames a second. Times are whole milliseconds (GIF: hundredths) and do not drift.
+
+    Raises
+    ------
+    ValueError
+        For no frames, frames that differ in size, a wrong rate or suffix.
+    OSError
+        When the file cannot be written; it names ``path``.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in _SUFFIXES:
+        raise ValueError(f"path: want a suffix of {', '.join(_SUFFIXES)}, got {suffix!r}")
+    if not 0 < frame_rate < math.inf:
+        raise ValueError(f"frame_rate: want frames a second above 0, got {frame_rate}")
+    pictures = []
+    for index, frame in enumerate(frames):
+        picture = arrays.image(f"frames[{index}]", frame)
+        if pictures:
+            arrays.same_size(f"frames[{index}]", picture, "the first frame", pictures[0].shape)
+        pictures.append(cv2.cvtColor(picture, _TO_BGRA[picture.shape[2]]))
+    if not pictures:
+        raise ValueError("frames: want at least one")
+    animation = cv2.Animation()
+    animation.frames = pictures
+    animation.durations = _durations(len(pictures), frame_rate, 10 if suffix == ".gif" else 1)
+    options = [cv2.IMWRITE_WEBP_QUALITY, 101] if suffix == ".webp" else []
+    good, encoded = cv2.imencodeanimation(".png" if suffix == ".apng" else suffix, animation, options)
+    if not good:
+        raise ValueError(f"frames: OpenCV cannot write {len(pictures)} pictures of {pictures[0].shape} as {suffix}")
+    atomic.write_bytes(path, encoded.data)
+
+
+def _durations(count: int, frame_rate: float, step: int) -> np.ndarray[tuple[int], np.dtype[np.int32]]:
+    """Milliseconds of each frame, multiples of ``step``, whose sums follow the true times."""
+    times = np.rint(np.arange(count + 1) * (1000 / frame_rate / step)) * step
+    return np.maximum(np.diff(times), step).astype(np.int32)
