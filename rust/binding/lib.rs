@@ -4,6 +4,7 @@ mod arrays;
 mod depth;
 mod errors;
 mod paint;
+mod raster;
 
 use pyo3::prelude::*;
 
@@ -14,4 +15,5 @@ mod _kernels {
     use crate::depth::limb_depth;
     #[pymodule_export]
     use crate::paint::{fill_polygon, stroke_polyline, unpremultiply};
+    use crate::raster::{render_passes, resolve_passes};
 }

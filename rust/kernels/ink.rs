@@ -1,0 +1,204 @@
+//! Ink lines on a band: outlines where a nearer surface ends before a farther one, and creases where a surface folds.
+//!
+//! A line belongs to the nearer surface. An outline grows from its last samples out over what is farther, with their depth
+//! and object; a crease lies on its surface, half to either side, with the surface's own depth, and so does the line where
+//! two surfaces cut each other. Neither covers anything nearer. Where several lines meet the nearest stays, of equals the upper left one.
+
+use crate::band::Band;
+use crate::error::KernelError;
+use crate::surface::Surface;
+use glam::Vec3;
+
+/// Widest line in samples.
+const WIDEST: f32 = 256.0;
+
+/// Neighbours compared at a time.
+const CHUNK: usize = 32;
+
+/// How lines are drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ink {
+    /// In samples, 0 for no lines.
+    pub width: f32,
+    /// Straight RGBA, laid over what is there.
+    pub color: [f32; 4],
+    /// Least angle between neighbouring faces' normals that makes a crease, in radians; above pi there are none.
+    pub crease_angle: f32,
+    /// Least difference of depth, as a part of the depth, that ends a surface of the same object.
+    pub depth_jump: f32,
+}
+
+impl Ink {
+    /// Refuses widths and factors that draw no line.
+    pub fn check(&self) -> Result<(), KernelError> {
+        let problem = if !(0.0..=WIDEST).contains(&self.width) {
+            "want a width of 0 to 256 samples"
+        } else if !(self.crease_angle >= 0.0 && self.depth_jump >= 0.0) {
+            "want an angle and a jump of zero or more"
+        } else if !self.color.iter().all(|value| value.is_finite()) {
+            "want a finite color"
+        } else {
+            return Ok(());
+        };
+        Err(KernelError::Argument { argument: "ink", problem })
+    }
+
+    /// How far outside of the picture a line that reaches into it may start.
+    pub fn margin(&self) -> usize {
+        if self.width > 0.0 { (self.width + 0.5).floor() as usize + 1 } else { 0 }
+    }
+}
+
+/// Why a sample draws.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Stroke {
+    Outline,
+    CreaseNearer,
+    CreaseFarther,
+}
+
+/// Finds and draws the lines of one band after another.
+pub struct Pen<'a> {
+    surfaces: &'a [Surface],
+    normals: &'a [Vec3],
+    least_cosine: f32,
+    depth_jump: f32,
+    stamps: [Vec<[i32; 2]>; 3],
+}
+
+impl<'a> Pen<'a> {
+    /// A pen for surfaces with unit normals.
+    pub fn new(ink: &Ink, surfaces: &'a [Surface], normals: &'a [Vec3]) -> Self {
+        // A sample's centre lies half a sample from the rim that it draws.
+        let on_surface = ink.width * 0.5 - 0.5;
+        let stamps = [
+            stamp(|distance| distance <= ink.width + 0.5, ink.margin() as i32),
+            stamp(|distance| distance <= on_surface.max(0.0), ink.margin() as i32),
+            stamp(|distance| distance < on_surface, ink.margin() as i32),
+        ];
+        let least_cosine = if ink.crease_angle > std::f32::consts::PI { -2.0 } else { ink.crease_angle.cos() };
+        Pen { surfaces, normals, least_cosine, depth_jump: ink.depth_jump, stamps }
+    }
+
+    /// Fills `owners`: for every sample of the band the sample that draws on it and one, or 0.
+    pub fn draw(&self, band: &Band, owners: &mut Vec<u32>) {
+        owners.clear();
+        owners.resize(band.width * band.rows, 0);
+        let mut strokes = self.strokes(band);
+        strokes.sort_unstable();
+        strokes.dedup();
+        for (sample, stroke) in strokes {
+            self.stamp(band, sample, stroke, owners);
+        }
+    }
+
+    /// The samples that draw, by looking at every pair of neighbours once.
+    fn strokes(&self, band: &Band) -> Vec<(u32, Stroke)> {
+        let mut found = Vec::new();
+        let size = band.width * band.rows;
+        for row in 0..band.rows {
+            let start = row * band.width;
+            let here = &band.surface[start..start + band.width];
+            let below = &band.surface[start + band.width.min(size - start - band.width)..][..band.width];
+            for first in (0..band.width).step_by(CHUNK) {
+                let last = (first + CHUNK).min(band.width);
+                let next = (first + 1).min(last)..(last + 1).min(band.width);
+                if differs(&here[first..last], &below[first..last]) {
+                    for column in (first..last).filter(|&c| here[c] != below[c]) {
+                        self.pair(band, start + column, start + column + band.width, &mut found);
+                    }
+                }
+                if differs(&here[first..first + next.len()], &here[next.clone()]) {
+                    for column in next.filter(|&c| here[c - 1] != here[c]) {
+                        self.pair(band, start + column - 1, start + column, &mut found);
+                    }
+                }
+            }
+        }
+        found
+    }
+
+    /// What two neighbours of different surfaces draw; of equally near ones the first counts as the nearer.
+    fn pair(&self, band: &Band, first: usize, second: usize, found: &mut Vec<(u32, Stroke)>) {
+        let swap = band.reciprocal[second] > band.reciprocal[first];
+        let (nearer, farther) = if swap { (second, first) } else { (first, second) };
+        let ends = self.ends_between(band, nearer, farther);
+        if ends && !self.dives_between(band, nearer, farther) {
+            found.push((nearer as u32, Stroke::Outline));
+        } else if ends || self.folds_between(band, nearer, farther) {
+            found.push((nearer as u32, Stroke::CreaseNearer));
+            found.push((farther as u32, Stroke::CreaseFarther));
+        }
+    }
+
+    /// Whether two samples lie on surfaces that do not go on from one to the other.
+    fn ends_between(&self, band: &Band, first: usize, second: usize) -> bool {
+        let (Some(a), Some(b)) = (self.surface(band, first), self.surface(band, second)) else {
+            return true;
+        };
+        if a.object != b.object {
+            return true;
+        }
+        let [here, there] = [first, second].map(|sample| f64::from(band.reciprocal[sample]));
+        let jump = f64::from(self.depth_jump);
+        if a.triangle == b.triangle || here.max(there) <= here.min(there) * (1.0 + jump) {
+            return false;
+        }
+        // A steep surface goes on where either triangle's plane, continued, meets the other sample.
+        let meets = |surface: &Surface, sample: usize, reciprocal: f64| {
+            let [x, y] = band.place_of(sample);
+            (surface.reciprocal(x, y).0 - reciprocal).abs() <= jump * reciprocal
+        };
+        !meets(a, second, there) && !meets(b, first, here)
+    }
+
+    /// Whether the nearer sample's plane, continued, lies behind the farther sample: the surfaces cut each other.
+    fn dives_between(&self, band: &Band, nearer: usize, farther: usize) -> bool {
+        let (Some(surface), [x, y]) = (self.surface(band, nearer), band.place_of(farther)) else { return false };
+        band.surface[farther] > 0 && surface.reciprocal(x, y).0 < f64::from(band.reciprocal[farther])
+    }
+
+    fn folds_between(&self, band: &Band, first: usize, second: usize) -> bool {
+        let normal = |sample: usize| self.normals.get((band.surface[sample] as usize).wrapping_sub(1));
+        let (Some(a), Some(b)) = (normal(first), normal(second)) else { return false };
+        a.dot(*b) <= self.least_cosine
+    }
+
+    fn surface(&self, band: &Band, sample: usize) -> Option<&Surface> {
+        self.surfaces.get((band.surface[sample] as usize).wrapping_sub(1))
+    }
+
+    fn stamp(&self, band: &Band, sample: u32, stroke: Stroke, owners: &mut [u32]) {
+        let source = sample as usize;
+        let (row, column) = ((source / band.width) as i32, (source % band.width) as i32);
+        for [down, right] in &self.stamps[stroke as usize] {
+            let (row, column) = (row + down, column + right);
+            if !(0..band.rows as i32).contains(&row) || !(0..band.width as i32).contains(&column) {
+                continue;
+            }
+            let target = row as usize * band.width + column as usize;
+            if band.reciprocal[target] > band.reciprocal[source] && stroke == Stroke::Outline {
+                continue;
+            }
+            if self.ends_between(band, source, target) != (stroke == Stroke::Outline) {
+                continue;
+            }
+            let owner = if stroke == Stroke::Outline { source } else { target };
+            let held = (owners[target] as usize).checked_sub(1).map_or(0.0, |o| band.reciprocal[o]);
+            if band.reciprocal[owner] > held {
+                owners[target] = owner as u32 + 1;
+            }
+        }
+    }
+}
+
+/// Whether two runs differ anywhere, without a branch a value.
+fn differs(a: &[u32], b: &[u32]) -> bool {
+    a.iter().zip(b).fold(0, |bits, (a, b)| bits | (a ^ b)) != 0
+}
+
+/// The steps (down, right) whose length is within reach.
+fn stamp(reaches: impl Fn(f32) -> bool, most: i32) -> Vec<[i32; 2]> {
+    let steps = (-most..=most).flat_map(|down| (-most..=most).map(move |right| [down, right]));
+    steps.filter(|[down, right]| reaches(((down * down + right * right) as f32).sqrt())).collect()
+}
