@@ -15,5 +15,6 @@ mod _kernels {
     use crate::depth::limb_depth;
     #[pymodule_export]
     use crate::paint::{fill_polygon, stroke_polyline, unpremultiply};
+    #[pymodule_export]
     use crate::raster::{render_passes, resolve_passes};
 }

@@ -30,6 +30,8 @@ from pegbar.scene.motion import Motion
 
 FRAMES = 48
 FRAME_RATE = 24.0
+TAIL_ROOT, TAIL_JOINTS = (0.0, 0.075, -0.125), 8
+"""Where the pony tail is tied, in the head's axes, and its number of points."""
 BEAT = 12
 STANCE = {"left": (0.17, 0.02, 0.04), "right": (-0.17, 0.02, 0.04)}
 LIFTED = {"right": (4, 20), "left": (28, 44)}
@@ -97,20 +99,22 @@ class Dance(NamedTuple):
 
     clip: Motion
     drawn: NDArray[np.float64]
+    tails: NDArray[np.float64]
 
 
 def dance(frames: int = FRAMES) -> Dance:
     """Return the phrase in ``frames`` frames at 24 a second; frame ``frames + 1`` would be the first one again.
 
     ``Dance.clip`` has bones of constant length, metres, Y up, the floor at 0; ``Dance.drawn`` (F, N, 3) are the
-    markers with squash and stretch: the same phrase with limbs and torso up to 12% longer or shorter on the accents.
+    markers with squash and stretch: the same phrase with limbs and torso up to 12% longer or shorter on the accents;
+    ``Dance.tails`` (F, n, 3) are the points of the drawn pony tail.
     """
     if frames < 1:
         raise ValueError(f"frames: want at least 1, got {frames}")
     times = np.arange(frames) * (FRAMES / frames)
     positions, rotations = pose(times)
     clip = Motion(NAMES, PARENTS, positions, rotations, FRAME_RATE)
-    return Dance(clip, pose(times, stretch=1.0)[0])
+    return Dance(clip, pose(times, stretch=1.0)[0], pony_tail(times))
 
 
 def pose(times: Floats, stretch: float = 0.0) -> tuple[Floats, Floats]:
@@ -218,19 +222,17 @@ def _foot(side: str, times: Floats) -> tuple[Floats, Floats]:
     return np.asarray(STANCE[side] + travel[:, :3]), pitch
 
 
-def pony_tail(times: Floats, root: tuple[float, float, float], joints: int = 8) -> Floats:
-    """Points (F, n, 3) of the hair that trails the drawn head: each follows where the one before it was."""
-    head = NAMES.index("head")
-    base, _ = pose(times, 1.0)
-    chain = np.empty((len(times), joints, 3))
-    for number in range(joints):
+def pony_tail(times: Floats) -> Floats:
+    """Points (F, n, 3) of the hair that trails the drawn head: each hangs from where its root was a little before."""
+    chain = np.empty((len(times), TAIL_JOINTS, 3))
+    root = np.array(TAIL_ROOT)
+    for number in range(TAIL_JOINTS):
         places, frames = pose(times - 1.1 * number, 1.0)
-        anchor = places[:, head] + frames[:, head] @ np.array(root)
-        back = -frames[:, head, :, 2]
+        frame = frames[:, NAMES.index("head")]
+        anchor = places[:, NAMES.index("head")] + frame @ root
         if number == 0:
-            chain[:, 0] = anchor
+            now = chain[:, 0] = anchor
             continue
-        lag = anchor - (base[:, head] + pose(times, 1.0)[1][:, head] @ np.array(root))
-        fall = 1.15 * back * 0.8**number + np.array([0.0, -0.3 - 0.22 * number, 0.0]) + 2.4 * lag
+        fall = -1.15 * 0.8**number * frame[..., 2] - [0.0, 0.3 + 0.22 * number, 0.0] + 2.4 * (anchor - now)
         chain[:, number] = chain[:, number - 1] + 0.055 * unit(fall)
     return chain

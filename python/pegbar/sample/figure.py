@@ -223,16 +223,21 @@ def _neckline(pose: Pose, view: View) -> list[Fill | Stroke]:
     return [Fill(edge, SKIN_SHADE), Stroke(trim, np.full(len(trim), width), TRIM)]
 
 
-def _skirt(pose: Pose, view: View) -> Part:
-    pelvis = pose.at("pelvis")
+def skirt_axis(pose: Pose) -> tuple[Floats, Floats]:
+    """The waist and the middle of the hem, which hangs half from the pelvis and half straight down."""
     up = pose.rotations[NAMES.index("pelvis")][:, 1] * 0.5 + (0, 0.5, 0)
+    return pose.at("pelvis"), pose.at("pelvis") - 0.30 * up
+
+
+def _skirt(pose: Pose, view: View) -> Part:
+    pelvis, low = skirt_axis(pose)
     top = _ring(pose, "pelvis", 0.10, 0.106, 0.082)
-    hem = _hem(pose, pelvis - 0.30 * up)
+    hem = _hem(pose, low)
     hem_rim = view.camera.project(hem)
     cloth = [_thigh_cloth(pose, view, side) for side in ("left", "right")]
     drape = hull(np.concatenate([view.camera.project(np.concatenate([top, hem[::2]])), *cloth]))
     pieces = [drape, resample(np.concatenate([hem_rim, hem_rim[:1]]), 2.0)[:-1]]
-    part = Part("skirt", "torso", view.axis(np.array([pelvis, pelvis - 0.22 * up]), 0.19))
+    part = Part("skirt", "torso", view.axis(np.array([pelvis, pelvis + 0.7 * (low - pelvis)]), 0.19))
     part.lines += [view.pen(piece, 201 + number) for number, piece in enumerate(pieces)]
     part.fills += [Fill(piece, DRESS, DRESS_LABEL) for piece in pieces]
     part.details += _folds(view, top, hem)
