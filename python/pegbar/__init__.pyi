@@ -9,8 +9,8 @@ from .layer.depth import limb_depth as limb_depth
 from .scene.camera import PerspectiveCamera as PerspectiveCamera
 from .scene.drawing import Drawing as Drawing
 from .scene.drawing import Limb as Limb
-from .scene.motion import Motion as Motion
 from .scene.mesh import Mesh as Mesh
+from .scene.motion import Motion as Motion
 from .simulate.passes import Ink as Ink
 from .simulate.passes import Passes as Passes
 from .simulate.passes import render_passes as render_passes

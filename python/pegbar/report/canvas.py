@@ -41,15 +41,13 @@ class Canvas:
     [0, 255, 128, 0]
     """
 
-    def __init__(
-        self, width: int, height: int, background: Color = (0, 0, 0, 0), *, antialias: bool = True
-    ) -> None:
+    def __init__(self, width: int, height: int, background: Color = (0, 0, 0, 0), *, antialias: bool = True) -> None:
         size = arrays.integers("size", (height, width), (2,), low=1, high=2**15)
         red, green, blue, alpha = _rgba("background", background)
         fill = [(value * alpha + 127) // 255 for value in (red, green, blue)]
         self.antialias = antialias
-        self._pixels = np.empty((*size.tolist(), 4), np.uint8)
-        self._pixels[:] = (*fill, alpha)
+        one = np.array([*fill, alpha], np.uint8).view(np.uint32)
+        self._pixels: NDArray[np.uint8] = np.full((*size.tolist(), 1), one).view(np.uint8)
 
     @property
     def size(self) -> tuple[int, int]:

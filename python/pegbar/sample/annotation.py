@@ -43,7 +43,7 @@ def seen(pose: Pose, view: PerspectiveCamera, labels: NDArray[np.uint8]) -> NDAr
 def annotate(
     folder: Path, drawn: Floats, cameras: tuple[PerspectiveCamera, ...], visible: NDArray[np.bool_]
 ) -> Drawing:
-    """Annotate the drawings in ``folder``: markers ``drawn`` (F, N, 3) in metres, of which ``visible`` (F, N) are seen."""
+    """Annotate the drawings in ``folder``: markers ``drawn`` (F, N, 3) in metres, ``visible`` (F, N) of them."""
     numbers = range(1, len(cameras) + 1)
     frames = list(zip(cameras, drawn, strict=True))
     return Drawing(

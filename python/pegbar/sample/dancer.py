@@ -7,6 +7,7 @@ reach for them, so a planted foot does not slide, stretched or not.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +29,8 @@ from pegbar.sample.skeleton import (
 )
 from pegbar.scene.motion import Motion
 
+Keys = tuple[float, ...] | tuple[tuple[float, ...], ...]
+
 FRAMES = 48
 FRAME_RATE = 24.0
 TAIL_ROOT, TAIL_JOINTS = (0.0, 0.075, -0.125), 8
@@ -38,7 +41,7 @@ LIFTED = {"right": (4, 20), "left": (28, 44)}
 """From which to which frame of the loop each foot is in the air."""
 
 # Eight keys, one every half beat: left step, rise, right leg's lift, fall, low reach, rise, left knee's lift, fall.
-_ROOT = [
+_ROOT = (
     (0.02, 0.80, 0.00),
     (0.13, 0.875, 0.00),
     (0.155, 0.925, -0.01),
@@ -47,10 +50,10 @@ _ROOT = [
     (-0.12, 0.86, 0.01),
     (-0.155, 0.925, -0.02),
     (-0.08, 0.87, -0.01),
-]
-_PELVIS = [(0, 6, 4), (12, 2, 1), (22, -2, -5), (8, 3, 0), (-8, 9, 5), (-18, 2, -1), (-26, -4, 5), (-12, 2, 0)]
-_CHEST = [(-6, 6, 7), (14, 2, 2), (42, -8, -10), (10, 4, 0), (-30, 13, 6), (-32, 2, 0), (-50, -6, 10), (-22, -6, 2)]
-_HEAD = [(8, 0, -8), (8, -4, 4), (20, -10, 12), (0, 4, 2), (-2, -6, 8), (-10, 2, 0), (-22, -12, -12), (-4, -2, -4)]
+)
+_PELVIS = ((0, 6, 4), (12, 2, 1), (22, -2, -5), (8, 3, 0), (-8, 9, 5), (-18, 2, -1), (-26, -4, 5), (-12, 2, 0))
+_CHEST = ((-6, 6, 7), (14, 2, 2), (42, -8, -10), (10, 4, 0), (-30, 13, 6), (-32, 2, 0), (-50, -6, 10), (-22, -6, 2))
+_HEAD = ((8, 0, -8), (8, -4, 4), (20, -10, 12), (0, 4, 2), (-2, -6, 8), (-10, 2, 0), (-22, -12, -12), (-4, -2, -4))
 # Directions of upper arm and forearm in the chest's axes, x outward on either side.
 _ARMS = {
     "left": [
@@ -87,10 +90,10 @@ _KNEES = {"right": (-0.62, 0.1, 0.80), "left": (0.40, 0.0, 0.92)}
 _TURNOUT = {"right": -24.0, "left": 24.0}
 # How much longer than in the clip the artist draws bones, by key.
 _STRETCH = {
-    "torso": [-0.07, 0.02, 0.10, 0.02, -0.09, 0.03, 0.10, 0.02],
-    "leg": [-0.06, 0.00, 0.06, 0.02, -0.08, 0.00, 0.06, 0.02],
-    "left": [0.10, 0.05, -0.05, 0.00, 0.12, 0.05, -0.06, 0.05],
-    "right": [0.08, 0.00, -0.06, 0.05, 0.10, 0.08, -0.05, 0.00],
+    "torso": (-0.07, 0.02, 0.10, 0.02, -0.09, 0.03, 0.10, 0.02),
+    "leg": (-0.06, 0.00, 0.06, 0.02, -0.08, 0.00, 0.06, 0.02),
+    "left": (0.10, 0.05, -0.05, 0.00, 0.12, 0.05, -0.06, 0.05),
+    "right": (0.08, 0.00, -0.06, 0.05, 0.10, 0.08, -0.05, 0.00),
 }
 
 
@@ -111,7 +114,7 @@ def dance(frames: int = FRAMES) -> Dance:
     """
     if frames < 1:
         raise ValueError(f"frames: want at least 1, got {frames}")
-    times = np.arange(frames) * (FRAMES / frames)
+    times = np.asarray(np.arange(frames) * (FRAMES / frames), np.float64)
     positions, rotations = pose(times)
     clip = Motion(NAMES, PARENTS, positions, rotations, FRAME_RATE)
     return Dance(clip, pose(times, stretch=1.0)[0], pony_tail(times))
@@ -122,11 +125,11 @@ def pose(times: Floats, stretch: float = 0.0) -> tuple[Floats, Floats]:
 
     ``stretch`` is how much of the artist's squash and stretch is put on: 0 for the clip, 1 for the drawings.
     """
-    scales = {part: 1 + stretch * _run(keys, _dwell(times)) for part, keys in _STRETCH.items()}
+    scales = {part: 1 + stretch * run(keys, _dwell(times)) for part, keys in _STRETCH.items()}
     rotations = _trunk(times)
     for side in ("left", "right"):
         rotations |= _arm(side, times)
-    root = _run(_ROOT, times)
+    root = run(_ROOT, times)
     # Squashed legs under an unmoved pelvis would only bend further: the pelvis goes with them.
     root[:, 1] += (scales["leg"] - 1) * (root[:, 1] - 0.1)
     for side in ("left", "right"):
@@ -136,7 +139,7 @@ def pose(times: Floats, stretch: float = 0.0) -> tuple[Floats, Floats]:
 
 def _bones(scales: dict[str, Floats]) -> dict[str, Floats]:
     """Scale of every bone that stretches, by the joint it ends in."""
-    bones = {name: scales["torso"] for name in ("chest", "neck")}
+    bones = dict.fromkeys(("chest", "neck"), scales["torso"])
     for side in ("left", "right"):
         # The shoulders stay on the stretched torso: chest to shoulder is mostly upwards.
         bones |= {f"{side}_{name}": scales["leg"] for name in ("knee", "foot")}
@@ -145,11 +148,15 @@ def _bones(scales: dict[str, Floats]) -> dict[str, Floats]:
     return bones
 
 
-def _run(keys: object, times: Floats) -> Floats:
-    """The periodic spline through the eight keys, at ``times`` in frames."""
-    values = np.array(keys, float)
-    spline = CubicSpline(np.arange(9) * (FRAMES / 8), np.concatenate([values, values[:1]]), bc_type="periodic")
-    return np.asarray(spline(np.mod(times, FRAMES)), np.float64)
+def run(keys: Keys, times: Floats) -> Floats:
+    """The periodic spline through ``keys`` spread evenly over the loop, at ``times`` in frames."""
+    return np.asarray(_spline(keys)(np.mod(times, FRAMES)), np.float64)
+
+
+@cache
+def _spline(keys: Keys) -> CubicSpline:
+    values = np.array([*keys, keys[0]], float)
+    return CubicSpline(np.linspace(0, FRAMES, len(values)), values, bc_type="periodic")
 
 
 def _dwell(times: Floats, late: float = 0.0) -> Floats:
@@ -160,7 +167,7 @@ def _dwell(times: Floats, late: float = 0.0) -> Floats:
 
 def _trunk(times: Floats) -> dict[str, Floats]:
     pelvis, chest, head = (
-        euler(*_run(keys, _dwell(times, late)).T) for keys, late in ((_PELVIS, 0.0), (_CHEST, 0.6), (_HEAD, 1.2))
+        euler(*run(keys, _dwell(times, late)).T) for keys, late in ((_PELVIS, 0.0), (_CHEST, 0.6), (_HEAD, 1.2))
     )
     return {"pelvis": pelvis, "chest": chest, "neck": _halfway(chest, head), "head": head}
 
@@ -177,10 +184,10 @@ def _arm(side: str, times: Floats) -> dict[str, Floats]:
     rest = mirror * (1.0, 0.0, 0.0)
     directions = []
     for bone, late in ((0, 1.0), (1, 1.8), (1, 3.6)):
-        keys = [key[bone] for key in _ARMS[side]]
-        chest = euler(*_run(_CHEST, _dwell(times, late)).T)
-        directions.append((chest @ (unit(_run(keys, _dwell(times, late))) * mirror)[..., None])[..., 0])
-    upper = _carry(euler(*_run(_CHEST, _dwell(times, 0.6)).T), rest, directions[0])
+        keys = tuple(key[bone] for key in _ARMS[side])
+        chest = euler(*run(_CHEST, _dwell(times, late)).T)
+        directions.append((chest @ (unit(run(keys, _dwell(times, late))) * mirror)[..., None])[..., 0])
+    upper = _carry(euler(*run(_CHEST, _dwell(times, 0.6)).T), rest, directions[0])
     fore = _carry(upper, rest, directions[1])
     # The wrist gives way by part of the trail only.
     fingers = unit(directions[1] + 0.8 * directions[2])
@@ -206,18 +213,24 @@ def _leg(side: str, times: Floats, root: Floats, pelvis: Floats, scale: Floats) 
     return {f"{side}_hip": thigh, f"{side}_knee": shin, f"{side}_foot": foot}
 
 
+@cache
+def _steps(side: str) -> tuple[CubicSpline, CubicSpline]:
+    """Place and pitch of a foot in the air, and its pitch on the floor, over the frames."""
+    lifts = np.array([*_LIFTS[side], (LIFTED[side][1], 0, 0, 0, 0)], float)
+    heels = np.array(_HEELS[side], float)
+    path = CubicSpline(lifts[:, 0], lifts[:, 1:], bc_type="clamped")
+    return path, CubicSpline(heels[:, 0], heels[:, 1], bc_type="clamped")
+
+
 def _foot(side: str, times: Floats) -> tuple[Floats, Floats]:
     """Place of the ball of the foot (F, 3) and pitch of the foot (F,) in degrees, toes down positive."""
     start, end = LIFTED[side]
-    lifts = np.array([*_LIFTS[side], (end, 0, 0, 0, 0)], float)
-    heels = np.array(_HEELS[side], float)
+    path, heel = _steps(side)
     phase = np.mod(times - start, FRAMES) + start
     airborne = phase < end
-    path = CubicSpline(lifts[:, 0], lifts[:, 1:], bc_type="clamped")
-    heel = CubicSpline(heels[:, 0], heels[:, 1], bc_type="clamped")
     # The heel's keys start at landing and end at take-off; no step in pitch or its slope at either.
     travel = np.where(airborne[:, None], path(np.where(airborne, phase, start)), 0.0)
-    grounded = np.where(airborne, heels[0, 0], phase)
+    grounded = np.where(airborne, end, phase)
     pitch = np.where(airborne, travel[:, 3], heel(grounded))
     return np.asarray(STANCE[side] + travel[:, :3]), pitch
 

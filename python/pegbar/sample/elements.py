@@ -6,7 +6,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from pegbar.sample.clearance import capsules, distance
-from pegbar.sample.dancer import FRAMES, pose
+from pegbar.sample.dancer import FRAMES, pose, run
 from pegbar.sample.figure import Pose
 from pegbar.sample.skeleton import NAMES, Floats, unit
 from pegbar.scene.mesh import Mesh
@@ -20,7 +20,7 @@ AT_HAND = 0.2
 
 # Every second frame: height above the floor, and how much the ring rises per metre to the left and to the front.
 # Chosen by search for the widest clearance from the body over the whole dance.
-_HOOP = [
+_HOOP = (
     (0.51, 0.20, -0.07),
     (0.55, 0.21, -0.07),
     (0.65, 0.20, -0.08),
@@ -45,16 +45,14 @@ _HOOP = [
     (1.05, -0.18, -0.08),
     (0.76, -0.01, -0.10),
     (0.57, 0.13, -0.09),
-]
+)
 _GOLD, _AMBER = (1.0, 0.62, 0.06, 1.0), (0.95, 0.30, 0.03, 1.0)
 _TEAL, _MINT = (0.0, 0.30, 0.36, 1.0), (0.22, 0.72, 0.60, 1.0)
 
 
 def hoop_ring(time: float, turn: Floats) -> Floats:
     """Points (n, 3) of the hoop's centre line at angles ``turn`` (n,), ``time`` in frames of the loop."""
-    keys = np.array([*_HOOP, _HOOP[0]])
-    curve = CubicSpline(np.linspace(0, FRAMES, len(keys)), keys, bc_type="periodic")
-    height, left, front = curve(time % FRAMES)
+    height, left, front = run(_HOOP, np.array([time]))[0]
     pelvis = pose(np.array([time]), 1.0)[0][0, 0]
     side = unit(np.array([1.0, left, 0.0]))
     ahead = np.array([0.0, front, 1.0])
@@ -138,7 +136,7 @@ def ribbon(time: float, tail: Floats) -> Mesh:
         sheets.append(edges.reshape(-1, 3))
     count = 2 * len(line)
     start = np.arange(0, count - 2, 2)[:, None]
-    strip = np.concatenate([start + (0, 1, 3), start + (0, 3, 2)])
+    strip = np.concatenate([start + np.array(corners) for corners in ((0, 1, 3), (0, 3, 2))])
     colors = np.concatenate([np.tile(color, (count, 1)) for color in (_TEAL, _MINT)])
     normals = np.concatenate([np.repeat(side * face, 2, axis=0) for side in (1, -1)])
     return Mesh(np.concatenate(sheets), np.concatenate([strip, strip + count]), colors, 2, normals)
@@ -152,5 +150,3 @@ def _carried(along: Floats) -> Floats:
         vector = unit(vector - (vector @ direction) * direction)
         out[index] = vector
     return out
-
-

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import zlib
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-from pegbar.sample.marks import Axis, Color, Fill, Part, Stroke, View, hull, outline, resample, smooth
+from pegbar.sample.marks import Color, Fill, Part, Stroke, View, hull, outline, resample
 from pegbar.sample.skeleton import NAMES, Floats
 from pegbar.scene.drawing import Limb
 
@@ -56,14 +59,19 @@ RADII: dict[str, tuple[float, float]] = {
     "foot": (0.034, 0.028),
 }
 # Spheres along a limb: place between its ends, radius, and how far back (against the limb's front) in metres.
-_PROFILES = {
+_PROFILES: dict[str, list[tuple[float, ...]]] = {
     "upper_arm": [(0.0, 0.046, 0), (0.4, 0.043, 0), (1.0, 0.034, 0)],
     "forearm": [(0.0, 0.034, 0), (0.28, 0.036, 0), (0.7, 0.028, 0), (1.0, 0.023, 0)],
     "thigh": [(0.0, 0.088, 0), (0.4, 0.078, 0), (1.0, 0.055, 0)],
     "shin": [(0.0, 0.053, 0), (0.3, 0.054, 0.016), (0.62, 0.042, 0.008), (1.0, 0.033, 0)],
 }
 # Rings of the bodice: height above the chest, half its width and depth, how far forward.
-_RIBS = [(-0.10, 0.110, 0.083, 0), (0.0, 0.134, 0.096, 0.008), (0.09, 0.149, 0.098, 0.012), (0.205, 0.112, 0.046, -0.01)]
+_RIBS = [
+    (-0.10, 0.110, 0.083, 0),
+    (0.0, 0.134, 0.096, 0.008),
+    (0.09, 0.149, 0.098, 0.012),
+    (0.205, 0.112, 0.046, -0.01),
+]
 _COLORS = {
     "upper_arm": (SKIN, SKIN_SHADE),
     "forearm": (SKIN, SKIN_SHADE),
@@ -80,10 +88,15 @@ class Pose(NamedTuple):
     tail: NDArray[np.float64]
 
     def at(self, name: str, *offset: float) -> Floats:
-        """The joint's place, or a point at ``offset`` (x, y, z) metres in its axes."""
+        """The joint's place (3,), or the point at ``offset`` (x, y, z) metres in its axes."""
+        point: Floats = self.around(name, np.array([offset or (0.0, 0.0, 0.0)]))[0]
+        return point
+
+    def around(self, name: str, local: Floats) -> Floats:
+        """World points (n, 3) of ``local`` (n, 3) metres in the joint's axes."""
         index = NAMES.index(name)
-        place: Floats = self.markers[index] + (self.rotations[index] @ np.array(offset) if offset else 0.0)
-        return place
+        points: Floats = self.markers[index] + local @ self.rotations[index].T
+        return points
 
 
 def body(pose: Pose, view: View) -> list[Part]:
@@ -106,7 +119,7 @@ def shaded(part: Part, centers: Floats, radii: Floats, colors: tuple[Color, Colo
 
 
 def _seed(name: str) -> int:
-    return sum(ord(letter) * 31**place for place, letter in enumerate(name)) % 65521
+    return zlib.crc32(name.encode()) % 65521
 
 
 def _limb(pose: Pose, view: View, limb: Limb, kind: str) -> Part:
@@ -134,7 +147,7 @@ def _shadow(centers: Floats, radii: Floats) -> Floats:
     return np.concatenate([centers + side, (centers + side * (1 - depth[:, None]))[::-1]])
 
 
-def _profile(keys: list[tuple[float, ...]]) -> Floats:
+def _profile(keys: Sequence[tuple[float, ...]]) -> Floats:
     """Columns of smoothly interpolated ``keys``, evenly over their first column."""
     values = np.array(keys, float)
     fine = np.linspace(values[0, 0], values[-1, 0], 11)
@@ -193,21 +206,18 @@ def _ring(pose: Pose, joint: str, height: float, wide: float, deep: float, forwa
     """Points (24, 3) on an ellipse round a joint's vertical axis."""
     turn = np.linspace(0, 2 * np.pi, 24, endpoint=False)
     local = np.column_stack([wide * np.sin(turn), np.full(24, height), deep * np.cos(turn) + forward])
-    rotation = pose.rotations[NAMES.index(joint)]
-    return pose.at(joint) + local @ rotation.T
+    return pose.around(joint, local)
 
 
 def _torso(pose: Pose, view: View) -> Part:
     rings = [_ring(pose, "chest", *row) for row in _profile(_RIBS).T] + [_ring(pose, "pelvis", 0.09, 0.104, 0.080)]
     part = Part("torso", "torso", view.axis(np.array([pose.at("neck"), pose.at("pelvis")]), 0.10))
-    pieces = [hull(view.camera.project(np.concatenate(pair))) for pair in zip(rings, rings[1:], strict=False)]
+    pieces = [hull(view.camera.project(np.concatenate(pair))) for pair in pairwise(rings)]
     part.lines += [view.pen(piece, 101 + number) for number, piece in enumerate(pieces)]
     part.fills += [Fill(piece, DRESS_SHADE, LABELS["torso"]) for piece in pieces]
     lit = [ring.mean(axis=0) + 0.86 * (ring - ring.mean(axis=0)) for ring in rings]
     nudge = np.array([-0.016, -0.004]) * float(view.scale(pose.at("chest")))
-    part.details += [
-        Fill(hull(view.camera.project(np.concatenate(pair))) + nudge, DRESS) for pair in zip(lit, lit[1:], strict=False)
-    ]
+    part.details += [Fill(hull(view.camera.project(np.concatenate(pair))) + nudge, DRESS) for pair in pairwise(lit)]
     part.details += _neckline(pose, view)
     return part
 
@@ -217,7 +227,7 @@ def _neckline(pose: Pose, view: View) -> list[Fill | Stroke]:
     turn = np.linspace(-np.pi / 2, np.pi / 2, 15)
     drop = 0.19 - 0.085 * np.cos(turn)
     local = np.column_stack([0.088 * np.sin(turn), drop, 0.02 + 0.072 * np.cos(turn)])
-    edge = view.camera.project(pose.at("chest") + local @ pose.rotations[NAMES.index("chest")].T)
+    edge = view.camera.project(pose.around("chest", local))
     trim = resample(edge, 2.0)
     width = 0.013 * float(view.scale(pose.at("chest")))
     return [Fill(edge, SKIN_SHADE), Stroke(trim, np.full(len(trim), width), TRIM)]
@@ -255,9 +265,8 @@ def _hem(pose: Pose, centre: Floats) -> Floats:
     """The skirt's hem (72, 3): a waving ring that swings with the pelvis."""
     turn = np.linspace(0, 2 * np.pi, 72, endpoint=False)
     wave = 1 + 0.055 * np.cos(9 * turn)
-    facing = pose.rotations[NAMES.index("pelvis")]
     local = np.column_stack([0.245 * wave * np.sin(turn), 0.014 * np.cos(9 * turn), 0.215 * wave * np.cos(turn)])
-    return centre + local @ facing.T
+    return pose.around("pelvis", local) + (centre - pose.at("pelvis"))
 
 
 def _folds(view: View, top: Floats, hem: Floats) -> list[Fill | Stroke]:

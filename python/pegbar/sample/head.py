@@ -43,8 +43,7 @@ def head(pose: Pose, view: View) -> list[Part]:
 
 
 def _points(pose: Pose, local: object) -> Floats:
-    points: Floats = pose.at("head") + np.array(local, float) @ pose.rotations[NAMES.index("head")].T
-    return points
+    return pose.around("head", np.array(local, float))
 
 
 def _spheres(pose: Pose, view: View, spheres: list[tuple[float, float, float, float]]) -> tuple[Floats, Floats]:
@@ -143,7 +142,9 @@ def _features(pose: Pose, view: View) -> list[Fill | Stroke]:
 def _eye(pose: Pose, view: View, side: float, size: float) -> list[Fill | Stroke]:
     def spot(x: float, y: float, z: float, wide: float, high: float) -> Floats:
         turn = np.linspace(0, 2 * np.pi, 20, endpoint=False)
-        local = np.column_stack([side * x + wide * np.cos(turn), y + high * np.sin(turn), z - side * 0.35 * wide * np.cos(turn)])
+        local = np.column_stack(
+            [side * x + wide * np.cos(turn), y + high * np.sin(turn), z - side * 0.35 * wide * np.cos(turn)]
+        )
         return view.camera.project(_points(pose, local))
 
     lash = [(side * 0.022, 0.006, 0.116), (side * 0.044, 0.018, 0.110), (side * 0.066, 0.004, 0.096)]
@@ -176,5 +177,3 @@ def _tail(pose: Pose, view: View) -> Part:
     tie = Stroke(centers[:1], 2.1 * discs[:1], TRIM)
     part.details.append(tie)
     return part
-
-

@@ -25,7 +25,7 @@ LINE = 0.0115
 
 
 class Fill(NamedTuple):
-    """A filled outline; ``label`` is its colour in the label picture, None for what is painted on a part already filled."""
+    """A filled outline; ``label`` is its colour in the label picture, None for paint on what is filled already."""
 
     points: Floats
     color: Color
@@ -129,12 +129,10 @@ def along(points: Floats) -> Floats:
 
 
 def _normals(points: Floats, closed: bool) -> Floats:
-    if closed:
-        tangent = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
-    else:
-        tangent = np.gradient(points, axis=0)
-    length = np.hypot(*tangent.T)
-    return np.column_stack([-tangent[:, 1], tangent[:, 0]]) / np.maximum(length, 1e-9)[:, None]
+    around = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
+    tangent = around if closed else np.gradient(points, axis=0)
+    normal: Floats = np.column_stack([-tangent[:, 1], tangent[:, 0]])
+    return np.asarray(normal / np.maximum(np.hypot(*tangent.T), 1e-9)[:, None])
 
 
 def _tremble(seed: int, at: Floats, period: float) -> Floats:
