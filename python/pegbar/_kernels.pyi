@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 __all__ = [
     "depth_composite",
+    "fill_polygon",
     "grow_labels",
     "has_alpha",
     "ink_alpha",
@@ -14,6 +15,8 @@ __all__ = [
     "render_passes",
     "resolve_passes",
     "segment_stick_figure",
+    "stroke_polyline",
+    "unpremultiply",
 ]
 
 _Floats = NDArray[np.float32]
@@ -45,6 +48,18 @@ def has_alpha(image: NDArray[np.uint8]) -> bool: ...
 def matte(
     image: NDArray[np.uint8], mode: str, labels: NDArray[np.uint8] | None
 ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]: ...
+def fill_polygon(
+    pixels: NDArray[np.uint8], points: NDArray[np.float64], color: tuple[int, int, int, int], antialias: bool
+) -> None: ...
+def stroke_polyline(
+    pixels: NDArray[np.uint8],
+    points: NDArray[np.float64],
+    widths: NDArray[np.float64],
+    closed: bool,
+    color: tuple[int, int, int, int],
+    antialias: bool,
+) -> None: ...
+def unpremultiply(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]: ...
 def render_passes(
     geometry: tuple[_Doubles, NDArray[np.uint32], _Floats, _Doubles, NDArray[np.uint16]],
     camera: tuple[list[list[float]], int, int],

@@ -6,6 +6,7 @@ mod depth;
 mod errors;
 mod grow;
 mod matte;
+mod paint;
 mod palette;
 mod raster;
 mod segment;
@@ -23,6 +24,8 @@ mod _kernels {
     use crate::grow::grow_labels;
     #[pymodule_export]
     use crate::matte::{has_alpha, ink_alpha, matte};
+    #[pymodule_export]
+    use crate::paint::{fill_polygon, stroke_polyline, unpremultiply};
     #[pymodule_export]
     use crate::palette::palette_labels;
     #[pymodule_export]

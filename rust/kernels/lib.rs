@@ -10,6 +10,7 @@ pub mod error;
 pub mod grow;
 pub mod ink;
 pub mod matte;
+pub mod paint;
 pub mod palette;
 pub mod raster;
 pub mod resolve;
