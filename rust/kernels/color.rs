@@ -4,6 +4,7 @@
 //! table with straight lines between; its largest error is 2e-6 below one (0.0005 of an 8-bit step).
 
 use crate::error::{KernelError, check_length};
+use multiversion::multiversion;
 use rayon::prelude::*;
 use std::sync::LazyLock;
 
@@ -50,10 +51,10 @@ impl Conversion {
     }
 }
 
-/// The table has 2^7 steps in every octave from 2^-9 to 2^6: the top bits of the number itself are the index.
+/// The table has 2^7 steps in every octave from 2^-9 to 2^16 (the largest half float): the top bits of the number itself are the index.
 const STEP_BITS: u32 = 23 - 7;
 const LOWEST: f32 = 1.0 / 512.0;
-const HIGHEST: f32 = 64.0;
+const HIGHEST: f32 = 65536.0;
 const FIRST: usize = (LOWEST.to_bits() >> STEP_BITS) as usize;
 const COUNT: usize = (HIGHEST.to_bits() >> STEP_BITS) as usize - FIRST;
 
@@ -69,93 +70,105 @@ fn decode_exact(display: f64) -> f64 {
     if display <= 0.040_45 { display / 12.92 } else { ((display + 0.055) / 1.055).powf(2.4) }
 }
 
-/// The encoding curve with its table at hand.
-#[derive(Clone, Copy)]
-struct Encoder(&'static [f32; COUNT + 1]);
-
-impl Encoder {
-    #[inline(always)]
-    fn apply(self, linear: f32) -> f32 {
-        let size = linear.abs();
-        let encoded = if size < LOWEST {
-            12.92 * size
-        } else if size < HIGHEST {
-            let bits = size.to_bits();
-            let index = ((bits >> STEP_BITS) as usize - FIRST).min(COUNT - 1);
-            let part = (bits & ((1 << STEP_BITS) - 1)) as f32 / (1u32 << STEP_BITS) as f32;
-            let (low, high) = (self.0[index], self.0[index + 1]);
-            low + part * (high - low)
-        } else {
-            encode_exact(f64::from(size)) as f32
-        };
-        encoded.copysign(linear)
+/// Encodes in three passes, so that all but the reading of the table becomes vectors.
+#[inline(always)]
+fn encode_plane<const N: usize>(plane: &mut [f32; N]) {
+    let table = &*ENCODED;
+    let (mut index, mut part, mut low, mut high) = ([0; N], [0.0; N], [0.0; N], [0.0; N]);
+    for i in 0..N {
+        let bits = plane[i].abs().clamp(LOWEST, f32::from_bits(HIGHEST.to_bits() - 1)).to_bits();
+        index[i] = (bits >> STEP_BITS) - FIRST as u32;
+        part[i] = (bits & ((1 << STEP_BITS) - 1)) as i32 as f32 * (1.0 / (1u32 << STEP_BITS) as f32);
     }
+    for i in 0..N {
+        let index = (index[i] as usize).min(COUNT - 1);
+        (low[i], high[i]) = (table[index], table[index + 1]);
+    }
+    let mut beyond = false;
+    for i in 0..N {
+        let size = plane[i].abs();
+        let curved = low[i] + part[i] * (high[i] - low[i]);
+        low[i] = if size < LOWEST { 12.92 * size } else { curved };
+        beyond |= size >= HIGHEST;
+    }
+    if beyond {
+        let values = low.iter_mut().zip(&*plane).filter(|(_, value)| value.abs() >= HIGHEST);
+        values.for_each(|(encoded, value)| *encoded = encode_exact(f64::from(value.abs())) as f32);
+    }
+    plane.iter_mut().zip(&low).for_each(|(value, encoded)| *value = encoded.copysign(*value));
 }
 
-fn decode(display: f32) -> f32 {
-    (decode_exact(f64::from(display.abs())) as f32).copysign(display)
+fn decode_plane<const N: usize>(plane: &mut [f32; N]) {
+    plane.iter_mut().for_each(|value| *value = decode_exact(f64::from(value.abs())).copysign(f64::from(*value)) as f32);
 }
 
 /// Converts premultiplied samples in place: unpremultiplied, converted, premultiplied again.
 ///
-/// Colour without coverage (a glow that only adds light) is converted as it is.
-pub fn convert_premultiplied(conversion: Conversion, color: [&mut [f32]; 3], coverage: &[f32]) {
-    match conversion {
-        Conversion::Keep => {}
-        Conversion::Encode => {
-            let encoder = Encoder(&ENCODED);
-            apply_unpremultiplied(|value| encoder.apply(value), color, coverage);
+/// Colour without coverage (a glow that only adds light) is converted as it is. Numbers stay finite.
+#[inline(always)]
+pub fn convert_premultiplied<const N: usize>(conversion: Conversion, color: &mut [[f32; N]; 3], coverage: &[f32; N]) {
+    if conversion == Conversion::Keep || color.as_flattened().iter().all(|value| *value == 0.0) {
+        return;
+    }
+    let mut scale = *coverage;
+    // Below the smallest normal number the reciprocal would be infinite.
+    scale.iter_mut().for_each(|value| *value = if *value >= f32::MIN_POSITIVE { *value } else { 1.0 });
+    for plane in color {
+        let values = plane.iter_mut().zip(&scale);
+        values.for_each(|(value, scale)| *value = (*value * (1.0 / scale)).clamp(f32::MIN, f32::MAX));
+        if conversion == Conversion::Encode {
+            encode_plane(plane)
+        } else {
+            decode_plane(plane)
         }
-        Conversion::Decode => apply_unpremultiplied(decode, color, coverage),
+        let values = plane.iter_mut().zip(&scale);
+        values.for_each(|(value, scale)| *value = (*value * scale).clamp(f32::MIN, f32::MAX));
     }
 }
 
-#[inline(always)]
-fn apply_unpremultiplied(curve: impl Fn(f32) -> f32, [red, green, blue]: [&mut [f32]; 3], coverage: &[f32]) {
-    for (((red, green), blue), &coverage) in red.iter_mut().zip(green).zip(blue).zip(coverage) {
-        if *red == 0.0 && *green == 0.0 && *blue == 0.0 {
-            continue;
-        }
-        let scale = if coverage > 0.0 { coverage } else { 1.0 };
-        for value in [red, green, blue] {
-            let straight = (*value / scale).clamp(f32::MIN, f32::MAX);
-            *value = (curve(straight) * scale).clamp(f32::MIN, f32::MAX);
-        }
-    }
-}
+/// Pixels of a picture converted at a time.
+const BLOCK: usize = 64;
 
 /// Converts a premultiplied RGBA picture between display and linear light; alpha stays.
 pub fn convert_picture(conversion: Conversion, pixels: &[f32], out: &mut [f32]) -> Result<(), KernelError> {
-    const BLOCK: usize = 256;
     check_length("out", pixels.len(), out.len())?;
-    let (source, _) = pixels.as_chunks::<4>();
-    let (target, _) = out.as_chunks_mut::<4>();
-    target.par_chunks_mut(BLOCK).zip(source.par_chunks(BLOCK)).for_each(|(target, source)| {
-        let mut planes = [[0.0; BLOCK]; 4];
-        for (i, pixel) in source.iter().enumerate() {
-            (0..4).for_each(|channel| planes[channel][i] = pixel[channel]);
-        }
-        let [red, green, blue, coverage] = &mut planes;
-        convert_premultiplied(conversion, [red, green, blue], coverage);
-        for (i, pixel) in target.iter_mut().enumerate() {
-            *pixel = [red[i], green[i], blue[i], coverage[i]];
-        }
-    });
+    let (source, target) = (pixels.as_chunks::<4>().0, out.as_chunks_mut::<4>().0);
+    let runs = target.par_chunks_mut(64 * BLOCK).zip(source.par_chunks(64 * BLOCK));
+    runs.for_each(|(target, source)| convert_run(conversion, source, target));
     Ok(())
+}
+
+#[multiversion(targets("x86_64+avx2"))]
+fn convert_run(conversion: Conversion, source: &[[f32; 4]], target: &mut [[f32; 4]]) {
+    for (target, source) in target.chunks_mut(BLOCK).zip(source.chunks(BLOCK)) {
+        let (mut color, mut coverage) = ([[0.0; BLOCK]; 3], [0.0; BLOCK]);
+        for (i, &[red, green, blue, alpha]) in source.iter().enumerate() {
+            [color[0][i], color[1][i], color[2][i], coverage[i]] = [red, green, blue, alpha];
+        }
+        convert_premultiplied(conversion, &mut color, &coverage);
+        for (i, pixel) in target.iter_mut().enumerate() {
+            *pixel = [color[0][i], color[1][i], color[2][i], coverage[i]];
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn encode(x: f32) -> f32 {
+        let mut plane = [x];
+        encode_plane(&mut plane);
+        plane[0]
+    }
+
     #[test]
     fn table_is_within_its_stated_error() {
-        let encoder = Encoder(&ENCODED);
         let worst = |from: f32, to: f32| {
             let range = (from.to_bits()..to.to_bits()).step_by(997);
             range
                 .map(f32::from_bits)
-                .fold(0.0, |worst: f64, x| worst.max((f64::from(encoder.apply(x)) - encode_exact(f64::from(x))).abs()))
+                .fold(0.0, |worst: f64, x| worst.max((f64::from(encode(x)) - encode_exact(f64::from(x))).abs()))
         };
         assert!(worst(0.0, 1.0) < 2e-6, "{}", worst(0.0, 1.0));
         assert!(worst(1.0, 100.0) < 2e-5, "{}", worst(1.0, 100.0));
@@ -163,21 +176,22 @@ mod tests {
 
     #[test]
     fn curves_are_inverse_and_odd() {
-        let encoder = Encoder(&ENCODED);
         for x in [0.0, 0.001, 0.0031, 0.0032, 0.18, 0.5, 1.0, 3.0, 63.9, 64.0, 1e6] {
-            assert!((decode(encoder.apply(x)) - x).abs() <= 1e-5 * x.max(0.1), "{x}");
-            assert_eq!(encoder.apply(-x), -encoder.apply(x));
+            let mut plane = [encode(x)];
+            decode_plane(&mut plane);
+            assert!((plane[0] - x).abs() <= 1e-5 * x.max(0.1), "{x}");
+            assert_eq!(encode(-x), -encode(x));
         }
-        assert_eq!(encoder.apply(f32::MAX), encode_exact(f64::from(f32::MAX)) as f32);
+        assert_eq!(encode(f32::MAX), encode_exact(f64::from(f32::MAX)) as f32);
     }
 
     #[test]
     fn glow_without_coverage_is_kept_and_nothing_becomes_infinite() {
-        let (mut red, mut green, mut blue) = ([0.0, 0.5, 0.5, f32::MAX], [0.0; 4], [0.0; 4]);
+        let mut color = [[0.0, 0.5, 0.5, f32::MAX], [0.0; 4], [0.0; 4]];
         let coverage = [0.0, 0.0, 1e-42, 1e-3];
-        convert_premultiplied(Conversion::Encode, [&mut red, &mut green, &mut blue], &coverage);
-        assert_eq!(red[0], 0.0);
-        assert!((f64::from(red[1]) - encode_exact(0.5)).abs() < 2e-6);
-        assert!(red.iter().chain(&green).chain(&blue).all(|value| value.is_finite()));
+        convert_premultiplied(Conversion::Encode, &mut color, &coverage);
+        assert_eq!(color[0][0], 0.0);
+        assert!((f64::from(color[0][1]) - encode_exact(0.5)).abs() < 2e-6);
+        assert!(color.as_flattened().iter().all(|value| value.is_finite()));
     }
 }

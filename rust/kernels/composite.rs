@@ -5,8 +5,9 @@
 //! render k times larger is composited sample by sample and averaged, so that edges between both stay smooth.
 
 use crate::color::{Conversion, Space};
-use crate::composite_block::{BLOCK, Hues, Pixel, Sample, Samples, Sums};
+use crate::composite_block::{BLOCK, Hues, Pixel, Sample, Samples, Sums, alphas_are_fine, block, depths_are_fine};
 use crate::error::{KernelError, check_length};
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 /// A drawing: straight RGB or RGBA bytes (its own alpha is not used), coverage, and depth (+inf: none, in front).
@@ -64,6 +65,9 @@ pub fn depth_composite(layer: &Layer, render: &Render, space: Space, out: Target
     }
 }
 
+/// Pixels worked together where rows do not matter.
+const RUN: usize = 64 * BLOCK;
+
 /// Everything that a row needs, sizes checked.
 struct Job<'a, S> {
     layer: &'a Layer<'a>,
@@ -103,46 +107,14 @@ impl<'a, S: Sample> Job<'a, S> {
         if out.is_empty() {
             return Ok(());
         }
-        let rows = out.as_chunks_mut().0.par_chunks_mut(self.layer.width).enumerate();
-        let fine = match (self.scale, self.layer.channels) {
-            (1, 3) => rows.map(|(row, out)| self.row::<T, 1, 3>(row, out)).reduce(|| true, |a, b| a & b),
-            (1, _) => rows.map(|(row, out)| self.row::<T, 1, 4>(row, out)).reduce(|| true, |a, b| a & b),
-            (_, 3) => rows.map(|(row, out)| self.row::<T, 0, 3>(row, out)).reduce(|| true, |a, b| a & b),
-            _ => rows.map(|(row, out)| self.row::<T, 0, 4>(row, out)).reduce(|| true, |a, b| a & b),
+        let width = if self.scale == 1 { RUN } else { self.layer.width };
+        let rows = out.as_chunks_mut().0.par_chunks_mut(width).enumerate();
+        let fine = if self.layer.channels == 3 {
+            rows.map(|(row, out)| composite_row::<S, T, 3>(self, row, width, out)).reduce(|| true, |a, b| a & b)
+        } else {
+            rows.map(|(row, out)| composite_row::<S, T, 4>(self, row, width, out)).reduce(|| true, |a, b| a & b)
         };
         if fine { Ok(()) } else { Err(self.fault()) }
-    }
-
-    /// Composites one row; tells whether all its values are allowed.
-    fn row<T: Pixel, const STEP: usize, const CHANNELS: usize>(&self, row: usize, out: &mut [[T; 4]]) -> bool {
-        let (width, scale) = (self.layer.width, self.scale);
-        let (mut samples, mut sums, mut hues) = (Samples::EMPTY, Sums::EMPTY, Hues::EMPTY);
-        let mut fine = true;
-        for (block, out) in out.chunks_mut(BLOCK).enumerate() {
-            let (first, count) = (block * BLOCK, out.len());
-            let place = row * width + first..row * width + first + count;
-            let (alpha, depth) = (&self.layer.alpha[place.clone()], &self.layer.depth[place.clone()]);
-            fine &= layer_is_fine(alpha, depth);
-            for sub in 0..scale * scale {
-                let start = (row * scale + sub / scale) * width * scale + first * scale + sub % scale;
-                fine &= samples.read_depth::<STEP>(count, scale, &self.depth[start..]);
-                fine &= S::read::<STEP>(&self.samples[start..], count, scale, self.rendered.as_ref(), &mut samples);
-                if !S::BYTES {
-                    samples.convert(self.conversion, count);
-                    if T::CLIPS {
-                        samples.clip(count);
-                    }
-                }
-                if sub == 0 {
-                    sums.add::<true>(alpha, depth, &samples);
-                } else {
-                    sums.add::<false>(alpha, depth, &samples);
-                }
-            }
-            hues.read::<CHANNELS>(&self.layer.pixels.as_chunks().0[place], self.drawn.as_ref());
-            T::write(&sums, &hues, 1.0 / (scale * scale) as f32, out);
-        }
-        fine
     }
 
     /// The first value that is not allowed.
@@ -164,14 +136,77 @@ impl<'a, S: Sample> Job<'a, S> {
     }
 }
 
-fn depth_is_fine(z: f32) -> bool {
-    z > f32::NEG_INFINITY
-}
-
-fn layer_is_fine(alpha: &[f32], depth: &[f32]) -> bool {
+/// Composites one row of `width` pixels; tells whether all its values are allowed.
+#[multiversion(targets("x86_64+avx2"))]
+fn composite_row<S: Sample, T: Pixel, const CHANNELS: usize>(
+    job: &Job<S>,
+    row: usize,
+    width: usize,
+    out: &mut [[T; 4]],
+) -> bool {
+    let (layer, scale) = (job.layer, job.scale);
+    let mut spare = Spare::<S, T, CHANNELS>::new();
+    let (mut samples, mut sums, mut hues) = (Samples::EMPTY, Sums::EMPTY, Hues::EMPTY);
     let mut fine = true;
-    for (&a, &z) in alpha.iter().zip(depth) {
-        fine &= (a >= 0.0) & (a <= 1.0) & depth_is_fine(z);
+    for (index, out) in out.chunks_mut(BLOCK).enumerate() {
+        let (first, count) = (index * BLOCK, out.len());
+        let place = row * width + first;
+        let alpha = block(&layer.alpha[place..], 1, count, &mut spare.alpha);
+        let depth = block(&layer.depth[place..], 1, count, &mut spare.depth);
+        fine &= alphas_are_fine(alpha) & depths_are_fine(depth);
+        for sub in 0..scale * scale {
+            let start = (row * scale + sub / scale) * width * scale + first * scale + sub % scale;
+            let rendered = block(&job.depth[start..], scale, count, &mut spare.rendered);
+            let pixels = block(&job.samples[start..], scale, count, &mut spare.samples);
+            fine &= depths_are_fine(rendered) & S::read(pixels, job.rendered.as_ref(), &mut samples);
+            if !S::BYTES {
+                samples.convert(job.conversion);
+                if T::CLIPS {
+                    samples.clip();
+                }
+            }
+            if sub == 0 {
+                sums.add::<true>(alpha, depth, &samples, rendered);
+            } else {
+                sums.add::<false>(alpha, depth, &samples, rendered);
+            }
+        }
+        let drawing = &layer.pixels.as_chunks().0[place..];
+        hues.read::<CHANNELS>(block(drawing, 1, count, &mut spare.drawing), job.drawn.as_ref());
+        let share = 1.0 / (scale * scale) as f32;
+        if let Ok(whole) = out.try_into() {
+            T::write(&sums, &hues, share, whole);
+        } else {
+            T::write(&sums, &hues, share, &mut spare.out);
+            out.copy_from_slice(&spare.out[..count]);
+        }
     }
     fine
+}
+
+/// Where values are put together that do not lie in memory as a whole block.
+struct Spare<S, T, const CHANNELS: usize> {
+    alpha: [f32; BLOCK],
+    depth: [f32; BLOCK],
+    rendered: [f32; BLOCK],
+    samples: [[S; 4]; BLOCK],
+    drawing: [[u8; CHANNELS]; BLOCK],
+    out: [[T; 4]; BLOCK],
+}
+
+impl<S: Sample, T: Pixel, const CHANNELS: usize> Spare<S, T, CHANNELS> {
+    fn new() -> Self {
+        Spare {
+            alpha: [0.0; BLOCK],
+            depth: [0.0; BLOCK],
+            rendered: [0.0; BLOCK],
+            samples: [S::NONE; BLOCK],
+            drawing: [[0; CHANNELS]; BLOCK],
+            out: [T::NONE; BLOCK],
+        }
+    }
+}
+
+fn depth_is_fine(z: f32) -> bool {
+    z > f32::NEG_INFINITY
 }

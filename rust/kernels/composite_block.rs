@@ -10,54 +10,54 @@ pub const BLOCK: usize = 64;
 
 type Plane = [f32; BLOCK];
 
-/// Samples of the render: colour, coverage, depth.
-pub struct Samples {
-    color: [Plane; 3],
-    coverage: Plane,
-    depth: Plane,
+/// `BLOCK` values, every `step`-th of `values`, as they lie in memory where possible; `spare` fills up a short block.
+#[inline(always)]
+pub fn block<'a, T: Copy>(values: &'a [T], step: usize, count: usize, spare: &'a mut [T; BLOCK]) -> &'a [T; BLOCK] {
+    if step == 1
+        && count == BLOCK
+        && let Some(whole) = values.first_chunk()
+    {
+        return whole;
+    }
+    spare.iter_mut().zip(values.iter().step_by(step)).take(count).for_each(|(slot, value)| *slot = *value);
+    spare
 }
 
-/// Weights of the drawing and light of the render, summed over a pixel's samples.
-pub struct Sums {
-    drawing: Plane,
+/// Whether all depths are allowed: not NaN, not -inf.
+#[inline(always)]
+pub fn depths_are_fine(depth: &Plane) -> bool {
+    depth.iter().fold(true, |fine, &z| fine & (z > f32::NEG_INFINITY))
+}
+
+/// Whether all of a drawing's alphas are in 0..=1.
+#[inline(always)]
+pub fn alphas_are_fine(alpha: &Plane) -> bool {
+    alpha.iter().fold(true, |fine, &a| fine & (a >= 0.0) & (a <= 1.0))
+}
+
+/// Samples of the render: premultiplied colour, and coverage.
+pub struct Samples {
     color: [Plane; 3],
     coverage: Plane,
 }
 
 impl Samples {
     /// Room for one block.
-    pub const EMPTY: Samples = Samples { color: [[0.0; BLOCK]; 3], coverage: [0.0; BLOCK], depth: [0.0; BLOCK] };
-
-    /// Takes every `step`-th depth; tells whether all are allowed (not NaN, not -inf).
-    pub fn read_depth<const STEP: usize>(&mut self, count: usize, step: usize, depth: &[f32]) -> bool {
-        let mut fine = true;
-        for (out, &z) in self.depth[..count].iter_mut().zip(every::<_, STEP>(depth, step)) {
-            *out = z;
-            fine &= z > f32::NEG_INFINITY;
-        }
-        fine
-    }
+    pub const EMPTY: Samples = Samples { color: [[0.0; BLOCK]; 3], coverage: [0.0; BLOCK] };
 
     /// Brings the colours to the result's space.
-    pub fn convert(&mut self, conversion: Conversion, count: usize) {
-        if conversion != Conversion::Keep {
-            let color = self.color.each_mut().map(|plane| &mut plane[..count]);
-            convert_premultiplied(conversion, color, &self.coverage[..count]);
-        }
+    #[inline(always)]
+    pub fn convert(&mut self, conversion: Conversion) {
+        convert_premultiplied(conversion, &mut self.color, &self.coverage);
     }
 
     /// What a monitor cannot show is cut off before samples are averaged, so that edges of highlights stay smooth.
-    pub fn clip(&mut self, count: usize) {
+    #[inline(always)]
+    pub fn clip(&mut self) {
         for plane in &mut self.color {
-            plane[..count].iter_mut().for_each(|value| *value = value.clamp(0.0, 1.0));
+            plane.iter_mut().for_each(|value| *value = value.clamp(0.0, 1.0));
         }
     }
-}
-
-/// Every `STEP`-th value, or every `step`-th where `STEP` is 0.
-#[inline(always)]
-fn every<T, const STEP: usize>(values: &[T], step: usize) -> impl Iterator<Item = &T> {
-    values.iter().step_by(if STEP == 0 { step } else { STEP })
 }
 
 /// A type of the render's samples.
@@ -65,14 +65,12 @@ pub trait Sample: Copy + Sync {
     /// Whether samples are bytes: straight, within 0..=1 and converted by table.
     const BYTES: bool;
 
-    /// Reads every `step`-th pixel, premultiplied; `table` holds the colour of each byte where it is not byte / 255.
-    fn read<const STEP: usize>(
-        pixels: &[[Self; 4]],
-        count: usize,
-        step: usize,
-        table: Option<&[f32; 256]>,
-        out: &mut Samples,
-    ) -> bool;
+    /// No light.
+    const NONE: [Self; 4];
+
+    /// Reads a block, premultiplied; `table` holds the colour of each byte where it is not byte / 255. Tells whether
+    /// all values are allowed.
+    fn read(pixels: &[[Self; 4]; BLOCK], table: Option<&[f32; 256]>, out: &mut Samples) -> bool;
 
     /// Whether the values of one pixel are allowed.
     fn allowed(pixel: &[Self; 4]) -> bool;
@@ -80,29 +78,21 @@ pub trait Sample: Copy + Sync {
 
 impl Sample for u8 {
     const BYTES: bool = true;
+    const NONE: [u8; 4] = [0; 4];
 
     #[inline(always)]
-    fn read<const STEP: usize>(
-        pixels: &[[u8; 4]],
-        count: usize,
-        step: usize,
-        table: Option<&[f32; 256]>,
-        out: &mut Samples,
-    ) -> bool {
-        let count = count.min(BLOCK);
+    fn read(pixels: &[[u8; 4]; BLOCK], table: Option<&[f32; 256]>, out: &mut Samples) -> bool {
         let [red, green, blue] = &mut out.color;
+        for (i, pixel) in pixels.iter().enumerate() {
+            let [r, g, b, a] = unpack(*pixel);
+            let coverage = a * (1.0 / 255.0);
+            let scale = coverage * (1.0 / 255.0);
+            (red[i], green[i], blue[i], out.coverage[i]) = (r * scale, g * scale, b * scale, coverage);
+        }
         if let Some(table) = table {
-            for (i, pixel) in every::<_, STEP>(pixels, step).take(count).enumerate() {
-                let coverage = f32::from(pixel[3]) / 255.0;
-                let [r, g, b, _] = pixel.map(|byte| table[usize::from(byte)] * coverage);
-                (red[i], green[i], blue[i], out.coverage[i]) = (r, g, b, coverage);
-            }
-        } else {
-            for (i, pixel) in every::<_, STEP>(pixels, step).take(count).enumerate() {
-                let [r, g, b, a] = unpack(*pixel);
-                let coverage = a * (1.0 / 255.0);
-                let scale = coverage * (1.0 / 255.0);
-                (red[i], green[i], blue[i], out.coverage[i]) = (r * scale, g * scale, b * scale, coverage);
+            for (i, pixel) in pixels.iter().enumerate() {
+                let [r, g, b, _] = pixel.map(|byte| table[usize::from(byte)] * out.coverage[i]);
+                (red[i], green[i], blue[i]) = (r, g, b);
             }
         }
         true
@@ -115,23 +105,15 @@ impl Sample for u8 {
 
 impl Sample for f32 {
     const BYTES: bool = false;
+    const NONE: [f32; 4] = [0.0; 4];
 
     #[inline(always)]
-    fn read<const STEP: usize>(
-        pixels: &[[f32; 4]],
-        count: usize,
-        step: usize,
-        _: Option<&[f32; 256]>,
-        out: &mut Samples,
-    ) -> bool {
-        let count = count.min(BLOCK);
+    fn read(pixels: &[[f32; 4]; BLOCK], _: Option<&[f32; 256]>, out: &mut Samples) -> bool {
         let [red, green, blue] = &mut out.color;
-        let mut zero = 0.0;
-        for (i, &[r, g, b, a]) in every::<_, STEP>(pixels, step).take(count).enumerate() {
-            zero += (r * 0.0 + g * 0.0) + (b * 0.0 + a * 0.0);
+        for (i, &[r, g, b, a]) in pixels.iter().enumerate() {
             (red[i], green[i], blue[i], out.coverage[i]) = (r, g, b, a.clamp(0.0, 1.0));
         }
-        zero == 0.0
+        pixels.as_flattened().iter().fold(true, |fine, value| fine & value.is_finite())
     }
 
     fn allowed(pixel: &[f32; 4]) -> bool {
@@ -146,19 +128,24 @@ fn unpack(pixel: [u8; 4]) -> [f32; 4] {
     [0, 8, 16, 24].map(|shift| ((word >> shift) & 0xff) as i32 as f32)
 }
 
+/// Weights of the drawing and light of the render, summed over a pixel's samples.
+pub struct Sums {
+    drawing: Plane,
+    color: [Plane; 3],
+    coverage: Plane,
+}
+
 impl Sums {
     /// Room for one block.
     pub const EMPTY: Sums = Sums { drawing: [0.0; BLOCK], color: [[0.0; BLOCK]; 3], coverage: [0.0; BLOCK] };
 
     /// Adds one sample of every pixel: nearer over farther, ties to the render (eqs. 16-17, PAPERS.md).
     #[inline(always)]
-    pub fn add<const FIRST: bool>(&mut self, alpha: &[f32], depth: &[f32], samples: &Samples) {
-        let count = alpha.len().min(BLOCK);
-        let (alpha, depth) = (&alpha[..count], &depth[..count]);
+    pub fn add<const FIRST: bool>(&mut self, alpha: &Plane, depth: &Plane, samples: &Samples, rendered: &Plane) {
         let add = |sum: &mut f32, value: f32| *sum = if FIRST { value } else { *sum + value };
-        for i in 0..count {
+        for i in 0..BLOCK {
             let (a, z, covered) = (alpha[i], depth[i], samples.coverage[i]);
-            let front = (z < samples.depth[i]) | (z == f32::INFINITY);
+            let front = (z < rendered[i]) | (z == f32::INFINITY);
             let drawing = if front { a } else { a - a * covered };
             let render = if front { 1.0 - a } else { 1.0 };
             add(&mut self.drawing[i], drawing);
@@ -179,18 +166,18 @@ impl Hues {
 
     /// Reads pixels of `CHANNELS` bytes; `table` as in [`Sample::read`].
     #[inline(always)]
-    pub fn read<const CHANNELS: usize>(&mut self, pixels: &[[u8; CHANNELS]], table: Option<&[f32; 256]>) {
-        let count = pixels.len().min(BLOCK);
+    pub fn read<const CHANNELS: usize>(&mut self, pixels: &[[u8; CHANNELS]; BLOCK], table: Option<&[f32; 256]>) {
         let [red, green, blue] = &mut self.0;
-        for (i, pixel) in pixels[..count].iter().enumerate() {
-            let rgb = match table {
-                Some(table) => [0, 1, 2].map(|channel| table[usize::from(pixel[channel])]),
-                None => {
-                    let [r, g, b, _] = unpack([pixel[0], pixel[1], pixel[2], 0]);
-                    [r, g, b].map(|value| value * (1.0 / 255.0))
-                }
-            };
-            [red[i], green[i], blue[i]] = rgb;
+        if let Some(table) = table {
+            for (i, pixel) in pixels.iter().enumerate() {
+                [red[i], green[i], blue[i]] = [0, 1, 2].map(|channel| table[usize::from(pixel[channel])]);
+            }
+        } else {
+            for (i, pixel) in pixels.iter().enumerate() {
+                let last = if CHANNELS == 4 { pixel[CHANNELS - 1] } else { 0 };
+                let [r, g, b, _] = unpack([pixel[0], pixel[1], pixel[2], last]);
+                [red[i], green[i], blue[i]] = [r, g, b].map(|value| value * (1.0 / 255.0));
+            }
         }
     }
 }
@@ -200,17 +187,20 @@ pub trait Pixel: Copy + Send {
     /// Whether samples are clipped to what the type can hold.
     const CLIPS: bool;
 
+    /// An empty pixel.
+    const NONE: [Self; 4];
+
     /// Writes a block: drawing and render added, divided by the number of samples.
-    fn write(sums: &Sums, hues: &Hues, share: f32, out: &mut [[Self; 4]]);
+    fn write(sums: &Sums, hues: &Hues, share: f32, out: &mut [[Self; 4]; BLOCK]);
 }
 
 impl Pixel for u8 {
     const CLIPS: bool = true;
+    const NONE: [u8; 4] = [0; 4];
 
     #[inline(always)]
-    fn write(sums: &Sums, hues: &Hues, share: f32, out: &mut [[u8; 4]]) {
-        let count = out.len().min(BLOCK);
-        for (i, pixel) in out[..count].iter_mut().enumerate() {
+    fn write(sums: &Sums, hues: &Hues, share: f32, out: &mut [[u8; 4]; BLOCK]) {
+        for (i, pixel) in out.iter_mut().enumerate() {
             let drawing = sums.drawing[i];
             let coverage = drawing + sums.coverage[i];
             let scale = if coverage > 0.0 { 255.0 / coverage } else { 0.0 };
@@ -232,11 +222,11 @@ fn nearest(value: f32) -> u32 {
 
 impl Pixel for f32 {
     const CLIPS: bool = false;
+    const NONE: [f32; 4] = [0.0; 4];
 
     #[inline(always)]
-    fn write(sums: &Sums, hues: &Hues, share: f32, out: &mut [[f32; 4]]) {
-        let count = out.len().min(BLOCK);
-        for (i, pixel) in out[..count].iter_mut().enumerate() {
+    fn write(sums: &Sums, hues: &Hues, share: f32, out: &mut [[f32; 4]; BLOCK]) {
+        for (i, pixel) in out.iter_mut().enumerate() {
             let drawing = sums.drawing[i];
             let color = |channel: usize| (hues.0[channel][i] * drawing + sums.color[channel][i]) * share;
             *pixel = [color(0), color(1), color(2), ((drawing + sums.coverage[i]) * share).min(1.0)];
