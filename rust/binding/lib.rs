@@ -17,19 +17,19 @@ use pyo3::prelude::*;
 #[pymodule(gil_used = false)]
 mod _kernels {
     #[pymodule_export]
-    use crate::composite::{depth_composite};
+    use crate::composite::depth_composite;
     #[pymodule_export]
-    use crate::depth::{limb_depth};
+    use crate::depth::limb_depth;
     #[pymodule_export]
-    use crate::grow::{grow_labels};
+    use crate::grow::grow_labels;
     #[pymodule_export]
     use crate::matte::{has_alpha, ink_alpha, matte};
     #[pymodule_export]
     use crate::paint::{fill_polygon, stroke_polyline, unpremultiply};
     #[pymodule_export]
-    use crate::palette::{palette_labels};
+    use crate::palette::palette_labels;
     #[pymodule_export]
     use crate::raster::{render_passes, resolve_passes};
     #[pymodule_export]
-    use crate::segment::{segment_stick_figure};
+    use crate::segment::segment_stick_figure;
 }

@@ -1,5 +1,1 @@
-<<<<<<< HEAD
-"""Pictures for people: overlays, contact sheets, depth maps made visible."""
-=======
-"""Pictures and sheets that show people what came out."""
->>>>>>> sample
+"""Pictures for people: overlays, contact sheets, depth maps made visible, and the canvas they are drawn on."""
