@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from pegbar.cli.batch import BatchOptions, progress, run_stage
 from pegbar.io.animation import write_animation
 from pegbar.io.frames import read_picture, write_image
-from pegbar.io.numbers import parse_frames
 from pegbar.report.contact_sheet import contact_sheet, over_paper
 from pegbar.sample.shot import write_sample
 from pegbar.shot.plan import Shot, open_shot
@@ -26,7 +25,7 @@ SHEET = 12
 def demo(
     folder: Path,
     *,
-    frames: Annotated[str | None, Parameter(help="Frames to make, like 1-12 (default: all 48).")] = None,
+    length: Annotated[int, Parameter(help="Number of frames that the dance is spread over.")] = 48,
     jobs: Annotated[int | None, Parameter(help="Worker processes (default: one a core).")] = None,
 ) -> int:
     """Make a sample shot from nothing, a drawn dancer with a hoop and a ribbon, and run every stage on it.
@@ -39,10 +38,9 @@ def demo(
         Where to put it; made if it is not there.
     """
     start = time.perf_counter()
-    numbers = parse_frames(frames) if frames else None
-    with progress("sample", len(numbers) if numbers else 48) as advance:
-        path = write_sample(folder, frames=numbers, progress=advance)
-    shot, options = open_shot(path), BatchOptions(frames, jobs)
+    with progress("sample", length) as advance:
+        path = write_sample(folder, frames=length, workers=jobs, progress=lambda *_: advance())
+    shot, options = open_shot(path), BatchOptions(jobs=jobs)
     for name, stage in (("depth", DepthStage(shot)), ("composite", CompositeStage(shot))):
         if code := run_stage(name, stage, options):
             return code
