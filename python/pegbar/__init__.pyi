@@ -4,6 +4,8 @@ from .errors import MissingFrameError as MissingFrameError
 from .errors import PegbarError as PegbarError
 from .errors import ShotError as ShotError
 from .layer.composite import depth_composite as depth_composite
+from .layer.composite import holdout_matte as holdout_matte
+from .layer.composite import visible_matte as visible_matte
 from .layer.depth import limb_depth as limb_depth
 from .scene.camera import PerspectiveCamera as PerspectiveCamera
 from .scene.drawing import Drawing as Drawing

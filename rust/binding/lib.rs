@@ -1,9 +1,11 @@
 //! `pegbar._kernels`: registers the wrappers; each file carries its kernel's name.
 
 mod arrays;
+mod color;
 mod composite;
 mod depth;
 mod errors;
+mod holdout;
 
 use pyo3::prelude::*;
 
@@ -11,7 +13,11 @@ use pyo3::prelude::*;
 #[pymodule(gil_used = false)]
 mod _kernels {
     #[pymodule_export]
+    use crate::color::convert_srgb;
+    #[pymodule_export]
     use crate::composite::depth_composite;
     #[pymodule_export]
     use crate::depth::limb_depth;
+    #[pymodule_export]
+    use crate::holdout::matte;
 }

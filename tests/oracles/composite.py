@@ -70,5 +70,7 @@ def average(samples, scale):
 def straight_bytes(premultiplied):
     """Quantised to the nearest of 0..255 with straight colours, 0 where nothing is covered."""
     coverage = premultiplied[..., 3:]
-    straight = np.divide(premultiplied[..., :3], coverage, out=np.zeros_like(premultiplied[..., :3]), where=coverage > 0)
+    straight = np.divide(
+        premultiplied[..., :3], coverage, out=np.zeros_like(premultiplied[..., :3]), where=coverage > 0
+    )
     return np.rint(255 * np.clip(np.concatenate([straight, coverage], axis=-1), 0, 1)).astype(np.uint8)
