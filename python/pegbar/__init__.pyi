@@ -6,6 +6,8 @@ from .errors import ShotError as ShotError
 from .io.annotations import read_annotations as read_annotations
 from .io.annotations_writer import write_annotations as write_annotations
 from .layer.composite import depth_composite as depth_composite
+from .layer.composite import holdout_matte as holdout_matte
+from .layer.composite import visible_matte as visible_matte
 from .layer.depth import limb_depth as limb_depth
 from .layer.matte import Matte as Matte
 from .layer.matte import ink_alpha as ink_alpha

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "convert_srgb",
     "depth_composite",
     "fill_polygon",
     "grow_labels",
@@ -23,6 +24,7 @@ _Floats = NDArray[np.float32]
 _Doubles = NDArray[np.float64]
 _Pictures = tuple[_Floats, _Floats, _Floats, NDArray[np.uint16]]
 
+def convert_srgb(pixels: NDArray[np.float32], encode: bool) -> NDArray[np.float32]: ...
 def depth_composite(
     drawing: NDArray[np.uint8],
     alpha: NDArray[np.float32],
@@ -70,3 +72,10 @@ def render_passes(
 def resolve_passes(
     beauty: _Floats, depth: _Floats, coverage: _Floats, object_id: NDArray[np.uint16], factor: int
 ) -> _Pictures: ...
+def matte(
+    alpha: NDArray[np.float32],
+    drawing_depth: NDArray[np.float32],
+    rendered_alpha: NDArray[np.float32] | None,
+    rendered_depth: NDArray[np.float32],
+    scale: int,
+) -> NDArray[np.float32]: ...

@@ -1,10 +1,12 @@
 //! `pegbar._kernels`: registers the wrappers; each file carries its kernel's name.
 
 mod arrays;
+mod color;
 mod composite;
 mod depth;
 mod errors;
 mod grow;
+mod holdout;
 mod matte;
 mod paint;
 mod palette;
@@ -17,11 +19,15 @@ use pyo3::prelude::*;
 #[pymodule(gil_used = false)]
 mod _kernels {
     #[pymodule_export]
+    use crate::color::convert_srgb;
+    #[pymodule_export]
     use crate::composite::depth_composite;
     #[pymodule_export]
     use crate::depth::limb_depth;
     #[pymodule_export]
     use crate::grow::grow_labels;
+    #[pymodule_export]
+    use crate::holdout::matte;
     #[pymodule_export]
     use crate::matte::{has_alpha, ink_alpha, matte};
     #[pymodule_export]

@@ -3,6 +3,7 @@
 //! The piecewise curve of IEC 61966-2-1 in both directions, odd about zero and continued beyond one. Encoding reads a
 //! table with straight lines between; its largest error is 2e-6 below one (0.0005 of an 8-bit step).
 
+use crate::checks::first_fault;
 use crate::error::{KernelError, check_length};
 use multiversion::multiversion;
 use rayon::prelude::*;
@@ -110,12 +111,12 @@ pub fn convert_premultiplied<const N: usize>(conversion: Conversion, color: &mut
     if conversion == Conversion::Keep || color.as_flattened().iter().all(|value| *value == 0.0) {
         return;
     }
-    let mut scale = *coverage;
     // Below the smallest normal number the reciprocal would be infinite.
-    scale.iter_mut().for_each(|value| *value = if *value >= f32::MIN_POSITIVE { *value } else { 1.0 });
+    let scale = coverage.map(|value| if value >= f32::MIN_POSITIVE { value } else { 1.0 });
+    let inverse = scale.map(f32::recip);
     for plane in color {
-        let values = plane.iter_mut().zip(&scale);
-        values.for_each(|(value, scale)| *value = (*value * (1.0 / scale)).clamp(f32::MIN, f32::MAX));
+        let values = plane.iter_mut().zip(&inverse);
+        values.for_each(|(value, inverse)| *value = (*value * inverse).clamp(f32::MIN, f32::MAX));
         if conversion == Conversion::Encode {
             encode_plane(plane)
         } else {
@@ -129,27 +130,38 @@ pub fn convert_premultiplied<const N: usize>(conversion: Conversion, color: &mut
 /// Pixels of a picture converted at a time.
 const BLOCK: usize = 64;
 
-/// Converts a premultiplied RGBA picture between display and linear light; alpha stays.
-pub fn convert_picture(conversion: Conversion, pixels: &[f32], out: &mut [f32]) -> Result<(), KernelError> {
+/// Converts a premultiplied RGBA picture of `width` columns between display and linear light; alpha stays.
+pub fn convert_picture(
+    conversion: Conversion,
+    pixels: &[f32],
+    width: usize,
+    out: &mut [f32],
+) -> Result<(), KernelError> {
     check_length("out", pixels.len(), out.len())?;
     let (source, target) = (pixels.as_chunks::<4>().0, out.as_chunks_mut::<4>().0);
     let runs = target.par_chunks_mut(64 * BLOCK).zip(source.par_chunks(64 * BLOCK));
-    runs.for_each(|(target, source)| convert_run(conversion, source, target));
-    Ok(())
+    let fine = runs.map(|(target, source)| convert_run(conversion, source, target)).reduce(|| true, |a, b| a & b);
+    let finite = |pixel: &[f32; 4]| pixel.iter().all(|value| value.is_finite());
+    let fault = || first_fault("pixels", "want finite colours", source, width, finite);
+    if fine { Ok(()) } else { fault().map_or(Ok(()), Err) }
 }
 
+/// Converts some pixels; tells whether all were finite.
 #[multiversion(targets("x86_64+avx2"))]
-fn convert_run(conversion: Conversion, source: &[[f32; 4]], target: &mut [[f32; 4]]) {
+fn convert_run(conversion: Conversion, source: &[[f32; 4]], target: &mut [[f32; 4]]) -> bool {
+    let mut fine = true;
     for (target, source) in target.chunks_mut(BLOCK).zip(source.chunks(BLOCK)) {
         let (mut color, mut coverage) = ([[0.0; BLOCK]; 3], [0.0; BLOCK]);
         for (i, &[red, green, blue, alpha]) in source.iter().enumerate() {
             [color[0][i], color[1][i], color[2][i], coverage[i]] = [red, green, blue, alpha];
         }
+        fine &= source.as_flattened().iter().fold(true, |fine, value| fine & value.is_finite());
         convert_premultiplied(conversion, &mut color, &coverage);
         for (i, pixel) in target.iter_mut().enumerate() {
             *pixel = [color[0][i], color[1][i], color[2][i], coverage[i]];
         }
     }
+    fine
 }
 
 #[cfg(test)]

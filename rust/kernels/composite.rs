@@ -4,6 +4,7 @@
 //! an opaque render, and without the hole that the printed form cuts where a soft edge of the render is nearer. A
 //! render k times larger is composited sample by sample and averaged, so that edges between both stay smooth.
 
+use crate::checks::{WANT_ALPHA, WANT_DEPTH, alpha_is_fine, depth_is_fine, first_fault};
 use crate::color::{Conversion, Space};
 use crate::composite_block::{BLOCK, Hues, Pixel, Sample, Samples, Sums, alphas_are_fine, block, depths_are_fine};
 use crate::error::{KernelError, check_length};
@@ -119,19 +120,11 @@ impl<'a, S: Sample> Job<'a, S> {
 
     /// The first value that is not allowed.
     fn fault(&self) -> KernelError {
-        let (layer, width) = (self.layer, self.layer.width);
-        let pixel = |argument, problem, index: Option<usize>, width: usize| {
-            index.map(|index| KernelError::Pixel { argument, problem, row: index / width, column: index % width })
-        };
-        let depth = "want metres or +inf, got NaN or -inf";
-        let alpha = layer.alpha.iter().position(|a| !(0.0..=1.0).contains(a));
-        let drawn = layer.depth.iter().position(|z| !depth_is_fine(*z));
-        let sample = self.samples.iter().position(|sample| !S::allowed(sample));
-        let rendered = self.depth.iter().position(|z| !depth_is_fine(*z));
-        pixel("alpha", "want 0 to 1", alpha, width)
-            .or_else(|| pixel("drawing_depth", depth, drawn, width))
-            .or_else(|| pixel("rendered", "want finite colours", sample, width * self.scale))
-            .or_else(|| pixel("rendered_depth", depth, rendered, width * self.scale))
+        let (layer, width, large) = (self.layer, self.layer.width, self.layer.width * self.scale);
+        first_fault("alpha", WANT_ALPHA, layer.alpha, width, |a| alpha_is_fine(*a))
+            .or_else(|| first_fault("drawing_depth", WANT_DEPTH, layer.depth, width, |z| depth_is_fine(*z)))
+            .or_else(|| first_fault("rendered", "want finite colours", self.samples, large, S::allowed))
+            .or_else(|| first_fault("rendered_depth", WANT_DEPTH, self.depth, large, |z| depth_is_fine(*z)))
             .unwrap_or(KernelError::Argument { argument: "rendered", problem: "changed while it was read" })
     }
 }
@@ -207,6 +200,66 @@ impl<S: Sample, T: Pixel, const CHANNELS: usize> Spare<S, T, CHANNELS> {
     }
 }
 
-fn depth_is_fine(z: f32) -> bool {
-    z > f32::NEG_INFINITY
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn one(alpha: f32, z: f32, rendered: [f32; 4], rendered_depth: f32) -> [f32; 4] {
+        let (alpha, depth, rendered_depth, mut out) = ([alpha], [z], [rendered_depth], [9.0; 4]);
+        let layer = Layer { pixels: &[255, 0, 255], channels: 3, width: 1, alpha: &alpha, depth: &depth };
+        let pixels = Rendered::Floats(&rendered);
+        let render = Render { pixels, depth: &rendered_depth, scale: 1, space: Space::Display };
+        assert_eq!(depth_composite(&layer, &render, Space::Display, Target::Floats(&mut out)), Ok(()));
+        out
+    }
+
+    #[test]
+    fn nearer_is_over_farther_and_ties_go_to_the_render() {
+        let render = [0.25, 0.5, 0.0, 0.5];
+        assert_eq!(one(0.5, 1.0, render, 2.0), [0.625, 0.25, 0.5, 0.75]);
+        assert_eq!(one(0.5, 3.0, render, 2.0), [0.5, 0.5, 0.25, 0.75]);
+        assert_eq!(one(0.5, 2.0, render, 2.0), one(0.5, 3.0, render, 2.0));
+        assert_eq!(one(0.5, f32::INFINITY, render, 2.0), one(0.5, 1.0, render, 2.0));
+    }
+
+    #[test]
+    fn an_opaque_plate_stays_exactly_opaque_and_coverage_beyond_one_is_cut() {
+        for step in 0..=1000u16 {
+            let alpha = f32::from(step) / 1000.0;
+            for z in [1.0, 3.0] {
+                assert_eq!(one(alpha, z, [0.5, 0.5, 0.5, 1.0], 2.0)[3], 1.0);
+                assert_eq!(one(alpha, z, [0.5, 0.5, 0.5, 4.0], 2.0)[3], 1.0);
+                assert!(one(1.0, z, [0.0, 0.0, 0.0, alpha], 2.0)[3] <= 1.0);
+            }
+        }
+    }
+
+    #[test]
+    fn a_block_across_the_end_of_a_row_is_the_same_as_pixel_by_pixel() {
+        let count = 3 * BLOCK + 7;
+        let value = |i: usize, by: usize| (i * by % 256) as u8;
+        let drawing: Vec<u8> = (0..count * 4).map(|i| value(i, 37)).collect();
+        let rendered: Vec<u8> = (0..count * 4).map(|i| value(i, 91)).collect();
+        let planes = [11, 13, 17].map(|by| (0..count).map(|i| f32::from(value(i, by)) / 255.0).collect::<Vec<_>>());
+        let composite = |place: std::ops::Range<usize>, out: &mut [u8]| {
+            let [alpha, depth, rendered_depth] = planes.each_ref().map(|plane| &plane[place.clone()]);
+            let bytes = place.start * 4..place.end * 4;
+            let layer = Layer { pixels: &drawing[bytes.clone()], channels: 4, width: place.len(), alpha, depth };
+            let pixels = Rendered::Bytes(&rendered[bytes]);
+            let render = Render { pixels, depth: rendered_depth, scale: 1, space: Space::Display };
+            assert_eq!(depth_composite(&layer, &render, Space::Display, Target::Bytes(out)), Ok(()));
+        };
+        let (mut whole, mut single) = (vec![0; count * 4], vec![0; count * 4]);
+        composite(0..count, &mut whole);
+        single.chunks_mut(4).enumerate().for_each(|(i, out)| composite(i..i + 1, out));
+        assert_eq!(whole, single);
+    }
+
+    #[test]
+    fn wrong_sizes_are_refused() {
+        let layer = Layer { pixels: &[0; 6], channels: 3, width: 2, alpha: &[0.0; 2], depth: &[0.0; 2] };
+        let render = Render { pixels: Rendered::Bytes(&[0; 8]), depth: &[0.0; 8], scale: 2, space: Space::Display };
+        let got = depth_composite(&layer, &render, Space::Display, Target::Bytes(&mut [0; 8]));
+        assert_eq!(got, Err(KernelError::Length { argument: "rendered", wanted: 32, got: 8 }));
+    }
 }

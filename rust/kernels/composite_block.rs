@@ -3,6 +3,7 @@
 //! Within a block colours are premultiplied and in 0..=1. No order of floating point sums depends on the machine's
 //! vector width, so results are the same bits everywhere.
 
+use crate::checks::{alpha_is_fine, depth_is_fine, in_front};
 use crate::color::{Conversion, convert_premultiplied};
 
 /// Pixels worked at a time: all planes together stay in the first-level cache.
@@ -26,13 +27,13 @@ pub fn block<'a, T: Copy>(values: &'a [T], step: usize, count: usize, spare: &'a
 /// Whether all depths are allowed: not NaN, not -inf.
 #[inline(always)]
 pub fn depths_are_fine(depth: &Plane) -> bool {
-    depth.iter().fold(true, |fine, &z| fine & (z > f32::NEG_INFINITY))
+    depth.iter().fold(true, |fine, &z| fine & depth_is_fine(z))
 }
 
 /// Whether all of a drawing's alphas are in 0..=1.
 #[inline(always)]
 pub fn alphas_are_fine(alpha: &Plane) -> bool {
-    alpha.iter().fold(true, |fine, &a| fine & (a >= 0.0) & (a <= 1.0))
+    alpha.iter().fold(true, |fine, &a| fine & alpha_is_fine(a))
 }
 
 /// Samples of the render: premultiplied colour, and coverage.
@@ -145,7 +146,7 @@ impl Sums {
         let add = |sum: &mut f32, value: f32| *sum = if FIRST { value } else { *sum + value };
         for i in 0..BLOCK {
             let (a, z, covered) = (alpha[i], depth[i], samples.coverage[i]);
-            let front = (z < rendered[i]) | (z == f32::INFINITY);
+            let front = in_front(z, rendered[i]);
             let drawing = if front { a } else { a - a * covered };
             let render = if front { 1.0 - a } else { 1.0 };
             add(&mut self.drawing[i], drawing);

@@ -1,6 +1,7 @@
 //! The pure kernels of pegbar, one file each, without Python. This file names the modules and defines nothing.
 
 pub mod band;
+pub mod checks;
 pub mod clip;
 pub mod color;
 pub mod composite;
@@ -8,6 +9,7 @@ pub mod composite_block;
 pub mod depth;
 pub mod error;
 pub mod grow;
+pub mod holdout;
 pub mod ink;
 pub mod matte;
 pub mod paint;
