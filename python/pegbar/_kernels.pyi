@@ -2,6 +2,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "fill_matte",
     "grow_labels",
     "has_alpha",
     "ink_alpha",
@@ -23,6 +24,7 @@ def palette_labels(
 def grow_labels(labels: NDArray[np.uint8], figure: NDArray[np.uint8], reach: float | None) -> NDArray[np.uint8]: ...
 def ink_alpha(image: NDArray[np.uint8]) -> NDArray[np.float32]: ...
 def has_alpha(image: NDArray[np.uint8]) -> bool: ...
-def matte(
-    image: NDArray[np.uint8], mode: str, labels: NDArray[np.uint8] | None
+def matte(image: NDArray[np.uint8], mode: str) -> tuple[NDArray[np.uint8], NDArray[np.float32]]: ...
+def fill_matte(
+    image: NDArray[np.uint8], labels: NDArray[np.uint8]
 ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]: ...

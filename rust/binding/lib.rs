@@ -18,7 +18,7 @@ mod _kernels {
     #[pymodule_export]
     use crate::grow::grow_labels;
     #[pymodule_export]
-    use crate::matte::{has_alpha, ink_alpha, matte};
+    use crate::matte::{fill_matte, has_alpha, ink_alpha, matte};
     #[pymodule_export]
     use crate::palette::palette_labels;
     #[pymodule_export]

@@ -2,6 +2,7 @@
 
 pub mod depth;
 pub mod error;
+pub mod fill;
 pub mod grow;
 pub mod matte;
 pub mod palette;
