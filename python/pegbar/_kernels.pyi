@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 __all__ = [
     "convert_srgb",
     "depth_composite",
+    "fill_matte",
     "fill_polygon",
     "grow_labels",
     "has_alpha",
@@ -47,8 +48,9 @@ def palette_labels(
 def grow_labels(labels: NDArray[np.uint8], figure: NDArray[np.uint8], reach: float | None) -> NDArray[np.uint8]: ...
 def ink_alpha(image: NDArray[np.uint8]) -> NDArray[np.float32]: ...
 def has_alpha(image: NDArray[np.uint8]) -> bool: ...
-def matte(
-    image: NDArray[np.uint8], mode: str, labels: NDArray[np.uint8] | None
+def matte(image: NDArray[np.uint8], mode: str) -> tuple[NDArray[np.uint8], NDArray[np.float32]]: ...
+def fill_matte(
+    image: NDArray[np.uint8], labels: NDArray[np.uint8]
 ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]: ...
 def fill_polygon(
     pixels: NDArray[np.uint8], points: NDArray[np.float64], color: tuple[int, int, int, int], antialias: bool

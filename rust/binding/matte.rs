@@ -1,16 +1,19 @@
-//! Wrapper of `kernels/matte.rs`.
+//! Wrapper of `kernels/matte.rs` and `kernels/fill.rs`.
 
 use crate::arrays::{empty, slice};
 use crate::errors::to_python;
 use numpy::{PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use pegbar_kernels::error::KernelError;
+use pegbar_kernels::fill;
 use pegbar_kernels::matte::{self as kernel, Mode};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+type Picture<'py> = PyReadonlyArray3<'py, u8>;
 type ColorAndAlpha<'py> = (Bound<'py, PyArray3<u8>>, Bound<'py, PyArray2<f32>>);
 
 #[pyfunction]
-pub fn ink_alpha<'py>(py: Python<'py>, image: PyReadonlyArray3<'py, u8>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+pub fn ink_alpha<'py>(py: Python<'py>, image: Picture<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
     let [height, width, channels] = [image.shape()[0], image.shape()[1], image.shape()[2]];
     let out: Bound<'py, PyArray2<f32>> = empty(py, [height, width])?;
     let mut target = out.readwrite();
@@ -21,34 +24,48 @@ pub fn ink_alpha<'py>(py: Python<'py>, image: PyReadonlyArray3<'py, u8>) -> PyRe
 }
 
 #[pyfunction]
-pub fn has_alpha(py: Python<'_>, image: PyReadonlyArray3<'_, u8>) -> PyResult<bool> {
+pub fn has_alpha(py: Python<'_>, image: Picture<'_>) -> PyResult<bool> {
     let channels = image.shape()[2];
     let image = slice("image", &image)?;
     Ok(py.detach(|| kernel::has_alpha(image, channels)))
 }
 
 #[pyfunction]
-#[pyo3(signature = (image, mode, labels))]
-pub fn matte<'py>(
+pub fn matte<'py>(py: Python<'py>, image: Picture<'py>, mode: &str) -> PyResult<ColorAndAlpha<'py>> {
+    let mode = match mode {
+        "ink" => Mode::Ink,
+        "unmix" => Mode::Unmix,
+        "alpha" => Mode::Alpha,
+        _ => return Err(PyValueError::new_err("mode: want \"ink\", \"unmix\" or \"alpha\"")),
+    };
+    into_color_and_alpha(py, &image, |image, channels, width, color, alpha| {
+        kernel::matte(mode, image, channels, width, color, alpha)
+    })
+}
+
+#[pyfunction]
+pub fn fill_matte<'py>(
     py: Python<'py>,
-    image: PyReadonlyArray3<'py, u8>,
-    mode: &str,
-    labels: Option<PyReadonlyArray2<'py, u8>>,
+    image: Picture<'py>,
+    labels: PyReadonlyArray2<'py, u8>,
+) -> PyResult<ColorAndAlpha<'py>> {
+    let labels = slice("labels", &labels)?;
+    into_color_and_alpha(py, &image, |image, channels, width, color, alpha| {
+        fill::fill_matte(image, channels, width, labels, color, alpha)
+    })
+}
+
+fn into_color_and_alpha<'py>(
+    py: Python<'py>,
+    image: &Picture<'py>,
+    kernel: impl FnOnce(&[u8], usize, usize, &mut [u8], &mut [f32]) -> Result<(), KernelError> + Send,
 ) -> PyResult<ColorAndAlpha<'py>> {
     let [height, width, channels] = [image.shape()[0], image.shape()[1], image.shape()[2]];
     let color: Bound<'py, PyArray3<u8>> = empty(py, [height, width, 3])?;
     let alpha: Bound<'py, PyArray2<f32>> = empty(py, [height, width])?;
     let (mut colors, mut alphas) = (color.readwrite(), alpha.readwrite());
-    let (image, colors_out, alphas_out) = (slice("image", &image)?, colors.as_slice_mut()?, alphas.as_slice_mut()?);
-    let labels = labels.as_ref().map(|labels| slice("labels", labels)).transpose()?;
-    let mode = match (mode, labels) {
-        ("ink", _) => Mode::Ink,
-        ("unmix", _) => Mode::Unmix,
-        ("fill", Some(labels)) => Mode::Fill(labels),
-        ("alpha", _) => Mode::Alpha,
-        _ => return Err(PyValueError::new_err("mode: unknown, or fill without labels")),
-    };
-    py.detach(|| kernel::matte(mode, image, channels, width, colors_out, alphas_out)).map_err(to_python)?;
+    let (image, colors_out, alphas_out) = (slice("image", image)?, colors.as_slice_mut()?, alphas.as_slice_mut()?);
+    py.detach(|| kernel(image, channels, width, colors_out, alphas_out)).map_err(to_python)?;
     drop((colors, alphas));
     Ok((color, alpha))
 }

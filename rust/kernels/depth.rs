@@ -42,20 +42,28 @@ impl Axis {
     /// Fills one run of pixels of this limb in one row.
     fn fill(&self, row: usize, column: usize, out: &mut [f32]) {
         let start = self.at_origin + (DVec2::new(column as f64, row as f64) - self.origin).dot(self.slope);
-        for (block, out) in out.chunks_mut(BLOCK).enumerate() {
-            let start = start + self.slope.x * (block * BLOCK) as f64;
-            for (depth, i) in out.iter_mut().zip(0i32..) {
-                *depth = (start + self.slope.x * f64::from(i)).max(self.low).min(self.high) as f32;
-            }
-            if self.reciprocal {
-                out.iter_mut().for_each(|depth| *depth = depth.recip());
-            }
+        let steps: [f64; LANES] = std::array::from_fn(|i| self.slope.x * i as f64);
+        let block_start = |block: usize| start + self.slope.x * (block * LANES) as f64;
+        let (blocks, rest) = out.as_chunks_mut::<LANES>();
+        let whole = blocks.len();
+        for (block, depths) in blocks.iter_mut().enumerate() {
+            let start = block_start(block);
+            *depths = steps.map(|step| self.depth(start + step));
         }
+        rest.iter_mut().zip(steps).for_each(|(depth, step)| *depth = self.depth(block_start(whole) + step));
+    }
+
+    /// The depth where the axis, longer than its limb, has `free`.
+    fn depth(&self, free: f64) -> f32 {
+        // Not `clamp`: its care for NaN keeps the compiler from packed minima and maxima.
+        let above = if free > self.low { free } else { self.low };
+        let depth = if above < self.high { above } else { self.high } as f32;
+        if self.reciprocal { depth.recip() } else { depth }
     }
 }
 
-/// Pixels worked at a time: their reciprocals are taken while they are in the fastest memory.
-const BLOCK: usize = 256;
+/// Pixels worked at a time.
+const LANES: usize = 8;
 
 /// How many labels at the front are the same.
 fn run_length(labels: &[u8]) -> usize {

@@ -9,11 +9,14 @@
 use crate::error::{KernelError, check_length};
 use rayon::prelude::*;
 
-/// How far the search around single pixels looks: a line's or rim's usual half width, and 49 places.
-const NEAR: i32 = 4;
+/// How far the search around single pixels looks: a wide line's or rim's width, 196 places.
+const NEAR: i32 = 8;
 
 /// Above one target in this many pixels the search around single pixels is left out: the envelope is cheaper then.
-const DENSE: usize = 16;
+const DENSE: usize = 32;
+
+/// Pixels looked at together: most blocks have no target.
+const BLOCK: usize = 64;
 
 /// No labelled pixel in this column.
 const NOWHERE: i32 = i32::MIN;
@@ -78,18 +81,29 @@ fn squared_limit(reach: f64) -> i64 {
     below.saturating_add(i64::from(((below as f64) + 1.0).sqrt() <= reach))
 }
 
+/// How many pixels of a row lie on the figure and have no label.
 fn count_targets(labels: &[u8], figure: &[u8]) -> usize {
-    let in_chunk = |(l, f): (&[u8], &[u8])| l.iter().zip(f).map(|(l, f)| u8::from(*l == 0 && *f != 0)).sum::<u8>();
-    labels.chunks(128).zip(figure.chunks(128)).map(in_chunk).map(usize::from).sum()
+    let in_block = |(l, f): (&[u8], &[u8])| l.iter().zip(f).map(|(l, f)| u8::from(*l == 0 && *f != 0)).sum::<u8>();
+    labels.chunks(BLOCK).zip(figure.chunks(BLOCK)).map(in_block).map(usize::from).sum()
 }
 
-/// The places around a pixel by distance, then column, then row: the first labelled one is the nearest.
+/// Calls `label` with the column of every target of a row, and writes what it finds.
+fn for_targets(out: &mut [u8], figure: &[u8], mut label: impl FnMut(usize) -> u8) {
+    for (block, (out, figure)) in out.chunks_mut(BLOCK).zip(figure.chunks(BLOCK)).enumerate() {
+        if count_targets(out, figure) > 0 {
+            for (i, (out, _)) in out.iter_mut().zip(figure).enumerate().filter(|(_, (l, f))| **l == 0 && **f != 0) {
+                *out = label(block * BLOCK + i);
+            }
+        }
+    }
+}
+
+/// The places (x, y) around a pixel by distance, then column, then row: the first labelled one is the nearest.
 fn places(limit: i64) -> Vec<[i32; 2]> {
-    let side = -NEAR..=NEAR;
-    let all = side.clone().flat_map(|x| side.clone().map(move |y| [x, y]));
     let squared = |[x, y]: &[i32; 2]| x * x + y * y;
-    let mut places: Vec<_> =
-        all.filter(|p| squared(p) <= NEAR * NEAR && i64::from(squared(p)) <= limit && squared(p) > 0).collect();
+    let most = limit.min(i64::from(NEAR * NEAR));
+    let all = (-NEAR..=NEAR).flat_map(|x| (-NEAR..=NEAR).map(move |y| [x, y]));
+    let mut places: Vec<_> = all.filter(|p| (1..=most).contains(&i64::from(squared(p)))).collect();
     places.sort_by_key(|p| (squared(p), p[0], p[1]));
     places
 }
@@ -97,19 +111,22 @@ fn places(limit: i64) -> Vec<[i32; 2]> {
 /// Looks around every target and returns how many found nothing.
 fn grow_near(map: Map, figure: &[u8], limit: i64, out: &mut [u8]) -> usize {
     let (places, width) = (places(limit), map.width as usize);
+    let steps: Vec<isize> = places.iter().map(|[x, y]| (*y * map.width + *x) as isize).collect();
+    let inner = |side: i32, i: i32| i >= NEAR && i < side - NEAR;
     let rows = out.par_chunks_mut(width).zip(figure.par_chunks(width)).enumerate();
     rows.map(|(row, (out, figure))| {
         let mut left = 0;
-        for (block, (out, figure)) in out.chunks_mut(32).zip(figure.chunks(32)).enumerate() {
-            if count_targets(out, figure) == 0 {
-                continue;
-            }
-            for (i, (out, _)) in out.iter_mut().zip(figure).enumerate().filter(|(_, (out, f))| **out == 0 && **f != 0) {
-                let (row, column) = (row as i32, (block * 32 + i) as i32);
-                *out = places.iter().map(|[x, y]| map.label(row + y, column + x)).find(|l| *l != 0).unwrap_or(0);
-                left += usize::from(*out == 0);
-            }
-        }
+        for_targets(out, figure, |column| {
+            let (y, x) = (row as i32, column as i32);
+            let found = if inner(map.height, y) && inner(map.width, x) {
+                let here = row * width + column;
+                steps.iter().map(|step| map.labels[here.wrapping_add_signed(*step)]).find(|label| *label != 0)
+            } else {
+                places.iter().map(|[dx, dy]| map.label(y + dy, x + dx)).find(|label| *label != 0)
+            };
+            left += usize::from(found.is_none());
+            found.unwrap_or(0)
+        });
         left
     })
     .sum()
@@ -118,46 +135,50 @@ fn grow_near(map: Map, figure: &[u8], limit: i64, out: &mut [u8]) -> usize {
 /// Gives every target that is left the label of the nearest labelled pixel of the whole picture.
 fn grow_far(map: Map, figure: &[u8], limit: i64, out: &mut [u8]) {
     let width = map.width as usize;
-    let nearest = nearest_rows(map);
-    let rows = out.par_chunks_mut(width).zip(figure.par_chunks(width)).zip(nearest.par_chunks(width)).enumerate();
-    rows.for_each_init(Vec::new, |envelope, (row, ((out, figure), nearest))| {
-        if count_targets(out, figure) == 0 {
-            return;
-        }
+    let mut rows: Vec<_> = out.par_chunks_mut(width).zip(figure.par_chunks(width)).enumerate().collect();
+    rows.retain(|(_, (out, figure))| count_targets(out, figure) > 0);
+    let numbers: Vec<usize> = rows.iter().map(|(row, _)| *row).collect();
+    let nearest = nearest_rows(map, &numbers);
+    rows.into_par_iter().zip(nearest.par_chunks(width)).for_each_init(Vec::new, |envelope, (row, nearest)| {
+        let (row, (out, figure)) = row;
         build_envelope(row as i32, nearest, envelope);
         let mut piece = 0;
-        for (column, (out, _)) in out.iter_mut().zip(figure).enumerate().filter(|(_, (out, f))| **out == 0 && **f != 0)
-        {
+        for_targets(out, figure, |column| {
             while piece + 1 < envelope.len() && envelope[piece + 1].start <= column as i64 {
                 piece += 1;
             }
-            if let Some(best) = envelope.get(piece)
-                && best.squared(column as i64) <= limit
-            {
-                *out = map.label(nearest[best.column as usize], best.column as i32);
-            }
-        }
+            let best = envelope.get(piece).filter(|best| best.squared(column as i64) <= limit);
+            best.map_or(0, |best| map.label(nearest[best.column as usize], best.column as i32))
+        });
     });
 }
 
-/// For every pixel the row of the nearest labelled pixel in its own column, the upper of two, or NOWHERE.
-fn nearest_rows(map: Map) -> Vec<i32> {
+/// For every pixel of the `wanted` rows, in order, the row of the nearest labelled pixel in its own column: the upper of
+/// two, or NOWHERE.
+fn nearest_rows(map: Map, wanted: &[usize]) -> Vec<i32> {
     let width = map.width as usize;
-    let mut nearest = vec![NOWHERE; map.labels.len()];
+    let mut nearest = vec![NOWHERE; wanted.len() * width];
     let mut last = vec![NOWHERE; width];
-    for (row, (nearest, labels)) in (0i32..).zip(nearest.chunks_mut(width).zip(map.labels.chunks(width))) {
-        for ((nearest, last), label) in nearest.iter_mut().zip(&mut last).zip(labels) {
-            *last = if *label != 0 { row } else { *last };
-            *nearest = *last;
+    let take = |row: usize, last: &mut [i32]| {
+        for (last, label) in last.iter_mut().zip(&map.labels[row * width..(row + 1) * width]) {
+            *last = if *label != 0 { row as i32 } else { *last };
         }
+    };
+    let mut row = 0;
+    for (wanted, nearest) in wanted.iter().zip(nearest.chunks_mut(width)) {
+        (row..=*wanted).for_each(|row| take(row, &mut last));
+        row = *wanted + 1;
+        nearest.copy_from_slice(&last);
     }
     last.fill(NOWHERE);
-    let below = (0..map.height).rev().zip(nearest.chunks_mut(width).rev().zip(map.labels.chunks(width).rev()));
-    for (row, (nearest, labels)) in below {
-        for ((nearest, last), label) in nearest.iter_mut().zip(&mut last).zip(labels) {
-            *last = if *label != 0 { row } else { *last };
-            let lower_is_nearer = *last != NOWHERE && (*nearest == NOWHERE || *last - row < row - *nearest);
-            *nearest = if lower_is_nearer { *last } else { *nearest };
+    let mut end = map.height as usize;
+    for (wanted, nearest) in wanted.iter().zip(nearest.chunks_mut(width)).rev() {
+        (*wanted..end).rev().for_each(|row| take(row, &mut last));
+        end = *wanted;
+        let row = *wanted as i32;
+        for (nearest, last) in nearest.iter_mut().zip(&last) {
+            let lower = *last != NOWHERE && (*nearest == NOWHERE || *last - row < row - *nearest);
+            *nearest = if lower { *last } else { *nearest };
         }
     }
     nearest
@@ -231,7 +252,7 @@ mod tests {
                 assert_eq!(far, want, "envelope, seed {seed}, limit {limit}");
                 let mut near = labels.clone();
                 grow_near(map, &figure, limit, &mut near);
-                assert_eq!(near, brute(&labels, &figure, 23, limit.min(16)), "around, seed {seed}, limit {limit}");
+                assert_eq!(near, brute(&labels, &figure, 23, limit.min(64)), "around, seed {seed}, limit {limit}");
             }
         }
     }

@@ -8,6 +8,7 @@ pub mod composite;
 pub mod composite_block;
 pub mod depth;
 pub mod error;
+pub mod fill;
 pub mod grow;
 pub mod holdout;
 pub mod ink;

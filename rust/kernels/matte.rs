@@ -15,21 +15,13 @@ const BLACK: f32 = 65_025_000.0;
 
 /// Where a matte's alpha and colour come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Mode<'a> {
+pub enum Mode {
     /// Equations 14 and 15: darkness; colour as drawn.
     Ink,
     /// Colour to alpha: the least alpha that explains the pixel over white, and the colour that does.
     Unmix,
-    /// Opaque where the labels are not zero, darkness outside with the colour unmixed by it.
-    Fill(&'a [u8]),
     /// The picture's own alpha channel and colour.
     Alpha,
-}
-
-/// A pixel over white: how much of each of red, green and blue is missing, times its alpha (0 to 65025).
-fn darkness<const C: usize>(pixel: &[u8; C]) -> [u32; 3] {
-    let alpha = if C == 4 { u32::from(pixel[3]) } else { 255 };
-    [0, 1, 2].map(|i| u32::from(255 - pixel[i]) * alpha)
 }
 
 fn ink<const C: usize>(pixel: &[u8; C]) -> f32 {
@@ -40,25 +32,69 @@ fn ink<const C: usize>(pixel: &[u8; C]) -> f32 {
 }
 
 /// The pixel over white, to the nearest.
-fn over_white<const C: usize>(pixel: &[u8; C]) -> [u8; 3] {
-    darkness(pixel).map(|dark| 255 - ((dark + 127) / 255) as u8)
+pub(crate) fn over_white<const C: usize>(pixel: &[u8; C]) -> [u8; 3] {
+    let alpha = if C == 4 { u32::from(pixel[3]) } else { 255 };
+    [0, 1, 2].map(|i| 255 - ((u32::from(255 - pixel[i]) * alpha + 127) / 255) as u8)
 }
 
-fn unmix<const C: usize>(pixel: &[u8; C]) -> ([u8; 3], f32) {
-    let dark = darkness(pixel);
-    let most = dark[0].max(dark[1]).max(dark[2]);
-    if most == 0 {
-        return ([255; 3], 0.0);
+/// 255 / alpha in 2^20ths, rounded up: exact enough for all 8-bit values, as a test says.
+const UNMIX: [u32; 256] = {
+    let mut table = [0; 256];
+    let mut alpha = 1;
+    while alpha < 256 {
+        table[alpha] = (255u32 << 20).div_ceil(alpha as u32);
+        alpha += 1;
     }
-    let scale = 255.0 / most as f32;
-    (dark.map(|dark| 255 - (dark as f32 * scale + 0.5) as u8), most as f32 / 65_025.0)
+    table
+};
+
+/// An 8-bit alpha as a number in 0..1.
+pub(crate) const OPACITY: [f32; 256] = {
+    let mut table = [0.0; 256];
+    let mut alpha = 0;
+    while alpha < 256 {
+        table[alpha] = alpha as f32 / 255.0;
+        alpha += 1;
+    }
+    table
+};
+
+/// The colour of which `alpha` 255ths over white give `color`, to the nearest; alpha must leave it possible.
+pub(crate) fn without_white(color: [u8; 3], alpha: u8) -> [u8; 3] {
+    let scale = UNMIX[usize::from(alpha)];
+    color.map(|value| 255 - ((u32::from(255 - value) * scale + (1 << 19)) >> 20) as u8)
 }
 
-/// Ink with the colour that gives the pixel over white, as far as there is one: what has none is cut off.
-fn unmix_ink<const C: usize>(pixel: &[u8; C]) -> ([u8; 3], f32) {
-    let alpha = ink(pixel);
-    let unmixed = |dark: u32| 255 - (dark as f32 / (255.0 * alpha) + 0.5).min(255.0) as u8;
-    if alpha > 0.0 { (darkness(pixel).map(unmixed), alpha) } else { ([255; 3], 0.0) }
+/// Colour to alpha: how far the pixel is from white at most, and the colour that is left.
+pub(crate) fn unmix([r, g, b]: [u8; 3]) -> ([u8; 3], f32) {
+    let alpha = 255 - r.min(g).min(b);
+    (without_white([r, g, b], alpha), OPACITY[usize::from(alpha)])
+}
+
+/// Pixels looked at together: a block of one colour, as paper and flat paint are, is worked once.
+pub(crate) const BLOCK: usize = 16;
+
+/// Writes colour and alpha of every pixel; the slices are equally long.
+pub(crate) fn shade<const C: usize>(
+    pixels: &[[u8; C]],
+    colors: &mut [[u8; 3]],
+    alphas: &mut [f32],
+    paint: impl Fn(&[u8; C]) -> ([u8; 3], f32),
+) {
+    let blocks = pixels.chunks(BLOCK).zip(colors.chunks_mut(BLOCK)).zip(alphas.chunks_mut(BLOCK));
+    for ((pixels, colors), alphas) in blocks {
+        let bytes = pixels.as_flattened();
+        // Equal to itself one pixel on: all of one colour.
+        if bytes[C..] == bytes[..bytes.len() - C] {
+            let (color, alpha) = paint(&pixels[0]);
+            colors.fill(color);
+            alphas.fill(alpha);
+        } else {
+            for ((pixel, color), alpha) in pixels.iter().zip(colors).zip(alphas) {
+                (*color, *alpha) = paint(pixel);
+            }
+        }
+    }
 }
 
 /// Writes equations 14 and 15 for a picture of `channels` (3 or 4) bytes a pixel.
@@ -97,9 +133,6 @@ pub fn matte(
 ) -> Result<(), KernelError> {
     check_length("alpha", image.len() / channels.max(1), alpha.len())?;
     check_length("color", alpha.len() * 3, color.len())?;
-    if let Mode::Fill(labels) = mode {
-        check_length("labels", alpha.len(), labels.len())?;
-    }
     match (channels, mode) {
         (3, Mode::Alpha) => {
             return Err(KernelError::Argument {
@@ -117,17 +150,57 @@ pub fn matte(
 fn matte_rows<const C: usize>(mode: Mode, image: &[u8], width: usize, color: &mut [u8], alpha: &mut [f32]) {
     let width = width.max(1);
     let rows = image.as_chunks::<C>().0.par_chunks(width).zip(color.as_chunks_mut::<3>().0.par_chunks_mut(width));
-    rows.zip(alpha.par_chunks_mut(width)).enumerate().for_each(|(row, ((pixels, colors), alphas))| {
-        let pixels = pixels.iter().zip(colors).zip(alphas);
-        match mode {
-            Mode::Ink => pixels.for_each(|((pixel, color), alpha)| (*color, *alpha) = (over_white(pixel), ink(pixel))),
-            Mode::Unmix => pixels.for_each(|((pixel, color), alpha)| (*color, *alpha) = unmix(pixel)),
-            Mode::Fill(labels) => pixels.zip(&labels[row * width..]).for_each(|(((pixel, color), alpha), label)| {
-                (*color, *alpha) = if *label > 0 { (over_white(pixel), 1.0) } else { unmix_ink(pixel) };
-            }),
-            Mode::Alpha => pixels.for_each(|((pixel, color), alpha)| {
-                (*color, *alpha) = ([pixel[0], pixel[1], pixel[2]], f32::from(pixel[C - 1]) / 255.0);
-            }),
+    rows.zip(alpha.par_chunks_mut(width)).for_each(|((pixels, colors), alphas)| match mode {
+        Mode::Ink => shade(pixels, colors, alphas, |pixel| (over_white(pixel), ink(pixel))),
+        Mode::Unmix => shade(pixels, colors, alphas, |pixel| unmix(over_white(pixel))),
+        Mode::Alpha => {
+            for ((pixel, color), alpha) in pixels.iter().zip(colors).zip(alphas) {
+                (*color, *alpha) = ([pixel[0], pixel[1], pixel[2]], OPACITY[usize::from(pixel[C - 1])]);
+            }
         }
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn white_is_exactly_clear_and_black_exactly_opaque() {
+        let mut alpha = [9.0; 4];
+        let image = [[255, 255, 255, 255], [0, 0, 0, 255], [0, 0, 0, 0], [0, 0, 0, 51]];
+        assert_eq!(ink_alpha(image.as_flattened(), 4, 4, &mut alpha), Ok(()));
+        assert_eq!(alpha, [0.0, 1.0, 0.0, 0.2]);
+        assert_eq!(ink_alpha(&image.as_flattened()[4..10], 3, 2, &mut alpha[..2]), Ok(()));
+        assert_eq!(alpha[..2], [1.0, 0.701]);
+    }
+
+    #[test]
+    fn unmixing_rounds_to_the_nearest_for_every_value() {
+        for alpha in 1..=255u32 {
+            for dark in 0..=alpha {
+                let want = 255 - (2 * dark * 255 + alpha) / (2 * alpha);
+                let value = (255 - dark) as u8;
+                assert_eq!(u32::from(without_white([value; 3], alpha as u8)[0]), want, "{dark} of {alpha}");
+            }
+        }
+    }
+
+    #[test]
+    fn unmixed_colour_over_white_is_the_pixel() {
+        for color in [[255, 255, 255], [200, 230, 255], [1, 2, 3], [254, 255, 255], [90, 90, 90]] {
+            let (unmixed, alpha) = unmix(color);
+            for i in 0..3 {
+                let back = f64::from(unmixed[i]) * f64::from(alpha) + 255.0 * (1.0 - f64::from(alpha));
+                assert!((back - f64::from(color[i])).abs() <= 0.50001, "{color:?} came back as {back}");
+            }
+        }
+    }
+
+    #[test]
+    fn own_alpha_is_refused_where_there_is_none() {
+        let got = matte(Mode::Alpha, &[0; 3], 3, 1, &mut [0; 3], &mut [0.0]);
+        assert!(matches!(got, Err(KernelError::Argument { argument: "image", .. })));
+        assert!(!has_alpha(&[0, 0, 0, 255], 4) && has_alpha(&[0, 0, 0, 254], 4) && !has_alpha(&[0; 3], 3));
+    }
 }

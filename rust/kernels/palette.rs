@@ -60,11 +60,11 @@ fn label<const C: usize>(image: &[u8], width: usize, swatches: &[Swatch], tolera
     let pixels = image.as_chunks::<C>().0;
     if tolerance > 0.0 {
         let mut classes = vec![NONE; out.len()];
-        let rows = classes.par_chunks_mut(width).zip(pixels.par_chunks(width));
-        rows.for_each_init(
-            || Nearest::new(swatches, tolerance),
-            |nearest, (classes, pixels)| _ = classify(pixels, NONE, classes, |color| nearest.class(color)),
-        );
+        let nearest = Nearest::new(swatches, tolerance);
+        classes.par_chunks_mut(width).zip(pixels.par_chunks(width)).for_each(|(classes, pixels)| {
+            let mut last = 0;
+            classify(pixels, NONE, classes, |color| nearest.class(color, &mut last));
+        });
         return label_settled(pixels, width, &classes, swatches, tolerance, out);
     }
     let exact = Exact::new(swatches);
@@ -101,9 +101,11 @@ fn label_settled<const C: usize>(
 }
 
 impl Unmatched {
-    fn add(&mut self, column: usize, count: usize) {
-        self.count += count;
-        self.first = self.first.or(Some([0, column]));
+    fn add(&mut self, found: Option<u8>, column: usize, count: usize) {
+        if found.is_none() {
+            self.count += count;
+            self.first = self.first.or(Some([0, column]));
+        }
     }
 
     fn at_row(self, row: usize) -> Self {
@@ -116,7 +118,10 @@ impl Unmatched {
     }
 }
 
-/// Reads a row of colours by `lookup`; `absent` is written where it finds nothing. Runs of one colour are looked up once.
+/// Pixels looked at together: a block of one colour is looked up once.
+const BLOCK: usize = 16;
+
+/// Reads a row of colours by `lookup`; `absent` is written where it finds nothing.
 fn classify<const C: usize>(
     pixels: &[[u8; C]],
     absent: u8,
@@ -125,22 +130,31 @@ fn classify<const C: usize>(
 ) -> Unmatched {
     let mut unmatched = Unmatched::default();
     let mut known: Option<([u8; C], Option<u8>)> = None;
-    for (block, (pixels, out)) in pixels.chunks(16).zip(out.chunks_mut(16)).enumerate() {
+    let mut read = |pixel: &[u8; C]| match known {
+        Some((color, found)) if color == *pixel => found,
+        _ => known.insert((*pixel, lookup(pixel))).1,
+    };
+    let (blocks, rest) = pixels.as_chunks::<BLOCK>();
+    let (block_labels, rest_labels) = out.as_chunks_mut::<BLOCK>();
+    for (block, (pixels, out)) in blocks.iter().zip(block_labels).enumerate() {
         let bytes = pixels.as_flattened();
         // Equal to itself one pixel on: all of one colour.
-        let whole = bytes[C..] == bytes[..bytes.len() - C];
-        let step = if whole { out.len() } else { 1 };
-        for (i, (pixel, out)) in pixels.iter().step_by(step).zip(out.chunks_mut(step)).enumerate() {
-            let found = match known {
-                Some((color, found)) if color == *pixel => found,
-                _ => lookup(pixel),
-            };
-            known = Some((*pixel, found));
-            out.fill(found.unwrap_or(absent));
-            if found.is_none() {
-                unmatched.add(block * 16 + i, out.len());
-            }
+        if bytes[C..] == bytes[..bytes.len() - C] {
+            let found = read(&pixels[0]);
+            *out = [found.unwrap_or(absent); BLOCK];
+            unmatched.add(found, block * BLOCK, BLOCK);
+            continue;
         }
+        for (i, (pixel, out)) in pixels.iter().zip(out).enumerate() {
+            let found = read(pixel);
+            *out = found.unwrap_or(absent);
+            unmatched.add(found, block * BLOCK + i, 1);
+        }
+    }
+    for (i, (pixel, out)) in rest.iter().zip(rest_labels).enumerate() {
+        let found = read(pixel);
+        *out = found.unwrap_or(absent);
+        unmatched.add(found, blocks.len() * BLOCK + i, 1);
     }
     unmatched
 }
@@ -151,11 +165,6 @@ fn packed(color: &[u8]) -> u32 {
 
 fn is_clear<const C: usize>(pixel: &[u8; C]) -> bool {
     C == 4 && pixel[C - 1] < OPAQUE
-}
-
-/// Multiplicative hashing: spreads the 24 bits of a colour over the top `bits`.
-fn slot(key: u32, bits: u32) -> usize {
-    (key.wrapping_mul(0x9E37_79B1) >> (32 - bits)) as usize
 }
 
 /// Colour to label by open addressing; at least half of the places are free, so that every search ends.
@@ -177,7 +186,8 @@ impl Exact {
     }
 
     fn place(&self, key: u32) -> usize {
-        let mut place = slot(key, self.bits);
+        // Multiplicative hashing: spreads the 24 bits of a colour over the top ones.
+        let mut place = (key.wrapping_mul(0x9E37_79B1) >> (32 - self.bits)) as usize;
         while self.places[place].is_some_and(|(other, _)| other != key) {
             place = (place + 1) % self.places.len();
         }
@@ -189,39 +199,45 @@ impl Exact {
     }
 }
 
-/// Colour to the nearest swatch within the tolerance, with a memory of the colours seen.
+/// Colour to the nearest swatch within the tolerance.
 struct Nearest<'a> {
     swatches: &'a [Swatch],
-    most: f64,
-    memory: Vec<(u32, Option<u8>)>,
+    /// The largest squared distance that matches.
+    most: i32,
+    /// Nearer than this (squared) to a swatch no other can be nearer: half the way to the next one.
+    sure: Vec<i32>,
 }
-
-const MEMORY_BITS: u32 = 12;
 
 impl<'a> Nearest<'a> {
     fn new(swatches: &'a [Swatch], tolerance: f64) -> Self {
-        Nearest { swatches, most: tolerance * tolerance, memory: vec![(u32::MAX, None); 1 << MEMORY_BITS] }
+        let most = (tolerance * tolerance) as i32;
+        let next = |i: usize| {
+            let others = swatches.iter().enumerate().filter(|(j, _)| *j != i);
+            others.map(|(_, other)| squared(&swatches[i].color, &other.color)).min()
+        };
+        let sure = (0..swatches.len()).map(|i| next(i).map_or(most, |next| (next / 4).min(most)));
+        Nearest { swatches, most, sure: sure.collect() }
     }
 
-    fn class<const C: usize>(&mut self, pixel: &[u8; C]) -> Option<u8> {
+    /// `last` is the class of the pixel before: as a rule this one's too.
+    fn class<const C: usize>(&self, pixel: &[u8; C], last: &mut usize) -> Option<u8> {
         if is_clear(pixel) {
             return Some(CLEAR);
         }
-        let key = packed(pixel);
-        let place = slot(key, MEMORY_BITS);
-        if self.memory[place].0 != key {
-            self.memory[place] = (key, self.search(pixel));
+        if squared(&self.swatches.get(*last)?.color, pixel) >= self.sure[*last] {
+            let distance = |swatch: &Swatch| squared(&swatch.color, pixel);
+            let (distance, class) = self.swatches.iter().map(distance).zip(0..).min()?;
+            if distance > self.most {
+                return None;
+            }
+            *last = class;
         }
-        self.memory[place].1
+        u8::try_from(*last).ok()
     }
+}
 
-    fn search(&self, pixel: &[u8]) -> Option<u8> {
-        let squared = |swatch: &Swatch| -> i32 {
-            (0..3).map(|i| i32::from(swatch.color[i]) - i32::from(pixel[i])).map(|d| d * d).sum()
-        };
-        let (distance, class) = (0u8..).zip(self.swatches).map(|(class, swatch)| (squared(swatch), class)).min()?;
-        (f64::from(distance) <= self.most).then_some(class)
-    }
+fn squared(a: &[u8; 3], b: &[u8]) -> i32 {
+    (0..3).map(|i| i32::from(a[i]) - i32::from(b[i])).map(|d| d * d).sum()
 }
 
 #[cfg(test)]

@@ -19,6 +19,12 @@ pub(crate) const CLEAR: u8 = u8::MAX - 1;
 /// lies one further in.
 const AROUND: usize = 3;
 
+/// How far single pixels of a colour are looked for when solid ones explain nothing: along a sliver too thin to be solid.
+const FARTHER: usize = 5;
+
+/// Pixels looked at together: most blocks are solid throughout.
+const BLOCK: usize = 32;
+
 /// The colours of the classes. Those of `background` may be mixed in anywhere.
 pub(crate) struct Palette {
     pub colors: Vec<Vec3>,
@@ -35,25 +41,27 @@ pub(crate) fn settle<const C: usize>(
     out: &mut [u8],
 ) {
     let mut solid = vec![NONE; classes.len()];
-    solid.par_chunks_mut(width).enumerate().for_each(|(row, solid)| solid_row(classes, width, row, solid));
+    let rows = solid.par_chunks_mut(width).enumerate();
+    rows.for_each_init(|| vec![NONE; width + 2], |upright, (row, solid)| solid_row(classes, row, upright, solid));
     let map = Map { classes, solid: &solid, width };
     let rows = out.par_chunks_mut(width).zip(pixels.par_chunks(width)).enumerate();
     rows.for_each_init(Vec::new, |seen, (row, (out, pixels))| settle_row(palette, map, row, pixels, seen, out));
 }
 
-/// The class of every pixel whose eight neighbours have it too, else NONE. Beyond the picture it goes on as at its border.
-fn solid_row(classes: &[u8], width: usize, row: usize, out: &mut [u8]) {
+/// The class of every pixel whose eight neighbours have it too, else NONE. Beyond the picture it goes on as at its
+/// border. `upright` is room for one row and a pixel on either side.
+fn solid_row(classes: &[u8], row: usize, upright: &mut [u8], out: &mut [u8]) {
+    let width = out.len();
     let line = |row: usize| &classes[row * width..(row + 1) * width];
     let (above, here) = (line(row.saturating_sub(1)), line(row));
     let below = line((row + 1).min(classes.len() / width - 1));
-    let mut column = [NONE; 3];
-    let upright = |i: usize| if above[i] == here[i] && below[i] == here[i] { here[i] } else { NONE };
-    column[1] = upright(0);
-    column[0] = column[1];
-    for i in 0..width {
-        column[2] = upright((i + 1).min(width - 1));
-        out[i] = if column[0] == column[1] && column[2] == column[1] { column[1] } else { NONE };
-        column = [column[1], column[2], NONE];
+    for (upright, ((above, here), below)) in upright[1..].iter_mut().zip(above.iter().zip(here).zip(below)) {
+        *upright = if (above ^ here) | (below ^ here) == 0 { *here } else { NONE };
+    }
+    (upright[0], upright[width + 1]) = (upright[1], upright[width]);
+    let sides = upright.iter().zip(&upright[1..]).zip(&upright[2..]);
+    for (out, ((left, here), right)) in out.iter_mut().zip(sides) {
+        *out = if (left ^ here) | (right ^ here) == 0 { *here } else { NONE };
     }
 }
 
@@ -86,30 +94,41 @@ fn settle_row<const C: usize>(
     seen: &mut Vec<u8>,
     out: &mut [u8],
 ) {
-    let start = row * map.width;
-    out.copy_from_slice(&map.classes[start..start + out.len()]);
-    for (column, (out, pixel)) in out.iter_mut().zip(pixels).enumerate() {
-        if map.solid[start + column] != NONE || *out == CLEAR {
+    let range = row * map.width..(row + 1) * map.width;
+    out.copy_from_slice(&map.classes[range.clone()]);
+    for (block, solid) in map.solid[range].chunks(BLOCK).enumerate() {
+        // Not `contains`: the fold is worked on many bytes at a time.
+        if !solid.iter().fold(false, |open, class| open | (*class == NONE)) {
             continue;
         }
-        seen.clear();
-        look_around(map.solid, map.width, [row, column], AROUND, seen);
-        if seen.contains(out) {
-            continue;
-        }
-        palette.background.iter().for_each(|class| {
-            if !seen.contains(class) {
-                seen.push(*class);
+        for column in (block * BLOCK..).zip(solid).filter(|(_, class)| **class == NONE).map(|(column, _)| column) {
+            if out[column] != CLEAR {
+                out[column] = settle_pixel(palette, map, [row, column], &pixels[column], seen);
             }
-        });
-        let color = Vec3::new(f32::from(pixel[0]), f32::from(pixel[1]), f32::from(pixel[2]));
-        let mut mixed = palette.unmix(color, seen);
-        if mixed.is_none() && *out == NONE {
-            look_around(map.classes, map.width, [row, column], 1, seen);
-            mixed = palette.unmix(color, seen);
         }
-        *out = mixed.unwrap_or(*out);
     }
+}
+
+/// The class of a pixel that is not solid.
+fn settle_pixel(palette: &Palette, map: Map, place: [usize; 2], pixel: &[u8], seen: &mut Vec<u8>) -> u8 {
+    let read = map.classes[place[0] * map.width + place[1]];
+    seen.clear();
+    look_around(map.solid, map.width, place, AROUND, seen);
+    if seen.contains(&read) {
+        return read;
+    }
+    for class in &palette.background {
+        if !seen.contains(class) {
+            seen.push(*class);
+        }
+    }
+    let color = Vec3::new(f32::from(pixel[0]), f32::from(pixel[1]), f32::from(pixel[2]));
+    let mut mixed = palette.unmix(color, seen);
+    if mixed.is_none() && read == NONE {
+        look_around(map.classes, map.width, place, FARTHER, seen);
+        mixed = palette.unmix(color, seen);
+    }
+    mixed.unwrap_or(read)
 }
 
 impl Palette {
@@ -196,7 +215,7 @@ mod tests {
     fn solid_is_the_middle_of_a_block_and_the_border_goes_on() {
         let classes = [[1, 1, 1, 2], [1, 1, 1, 2], [1, 1, 3, 2]].concat();
         let mut out = vec![9; 12];
-        (0..3).for_each(|row| solid_row(&classes, 4, row, &mut out[row * 4..row * 4 + 4]));
+        (0..3).for_each(|row| solid_row(&classes, row, &mut [0; 6], &mut out[row * 4..row * 4 + 4]));
         assert_eq!(out, [[1, 1, NONE, NONE], [1, NONE, NONE, NONE], [1, NONE, NONE, NONE]].concat());
     }
 }

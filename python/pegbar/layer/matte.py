@@ -58,7 +58,8 @@ def matte(image: ArrayLike, mode: Mode | Literal["auto"] = "auto", *, labels: Ar
     mode : {"auto", "ink", "unmix", "fill", "alpha"}
         - "ink": equations 14 and 15 of Jain et al. 2010, alpha = darkness, colour as drawn. Light colours become glass.
         - "unmix": alpha = 1 - min(R, G, B), and the colour that over white gives the drawing back.
-        - "fill": alpha 1 inside the labelled limbs; outside, darkness with the colour unmixed by it.
+        - "fill": alpha 1 inside the labelled limbs, "unmix" outside. The limbs' border pixels, part paint and part paper,
+          get the alpha with which the paint farther in explains them.
         - "alpha": the picture's own alpha and colour.
         - "auto": "alpha" for a picture whose alpha channel is not all 255, else "fill" if there are labels, else
           "unmix".
@@ -91,7 +92,8 @@ def matte(image: ArrayLike, mode: Mode | Literal["auto"] = "auto", *, labels: Ar
         mode = "alpha" if _kernels.has_alpha(image) else "unmix" if labels is None else "fill"
     if mode == "alpha" and image.shape[2] == 3:
         raise ValueError('image: want an alpha channel for the matte "alpha", got 3 channels')
-    if mode == "fill" and labels is None:
-        raise ValueError('labels: want limb labels for the matte "fill", got None')
-    color, alpha = _kernels.matte(image, mode, labels if mode == "fill" else None)
-    return Matte(color, alpha, mode)
+    if mode == "fill":
+        if labels is None:
+            raise ValueError('labels: want limb labels for the matte "fill", got None')
+        return Matte(*_kernels.fill_matte(image, labels), mode)
+    return Matte(*_kernels.matte(image, mode), mode)
