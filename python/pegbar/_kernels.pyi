@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "composite_matte",
     "convert_srgb",
     "depth_composite",
     "fill_matte",
@@ -74,7 +75,7 @@ def render_passes(
 def resolve_passes(
     beauty: _Floats, depth: _Floats, coverage: _Floats, object_id: NDArray[np.uint16], factor: int
 ) -> _Pictures: ...
-def matte(
+def composite_matte(
     alpha: NDArray[np.float32],
     drawing_depth: NDArray[np.float32],
     rendered_alpha: NDArray[np.float32] | None,

@@ -7,7 +7,7 @@ use pegbar_kernels::holdout::{self, Planes};
 use pyo3::prelude::*;
 
 #[pyfunction]
-pub fn matte<'py>(
+pub fn composite_matte<'py>(
     py: Python<'py>,
     alpha: PyReadonlyArray2<'py, f32>,
     drawing_depth: PyReadonlyArray2<'py, f32>,

@@ -27,7 +27,7 @@ mod _kernels {
     #[pymodule_export]
     use crate::grow::grow_labels;
     #[pymodule_export]
-    use crate::holdout::matte;
+    use crate::holdout::composite_matte;
     #[pymodule_export]
     use crate::matte::{fill_matte, has_alpha, ink_alpha, matte};
     #[pymodule_export]

@@ -177,7 +177,7 @@ def _matte(
     scale = _scale("rendered_depth", rendered_depth, alpha.shape)
     if rendered_alpha is not None:
         arrays.same_size("rendered_alpha", rendered_alpha, "rendered_depth", rendered_depth.shape)
-    return _kernels.matte(alpha, drawing_depth, rendered_alpha, rendered_depth, scale)
+    return _kernels.composite_matte(alpha, drawing_depth, rendered_alpha, rendered_depth, scale)
 
 
 def _samples(rendered: ArrayLike) -> NDArray[Any]:
