@@ -141,6 +141,7 @@ def test_far_points_are_clipped_in_peace(points, width):
     canvas = Canvas(7, 5)
     canvas.polygon(points, (1, 2, 3))
     canvas.polyline(points, width, (1, 2, 3))
+    assert np.abs(canvas.image()[canvas.image()[..., 3] > 127][:, :3] - (1.0, 2.0, 3.0)).max(initial=0) <= 1
 
 
 @pytest.mark.parametrize(

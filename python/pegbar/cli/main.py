@@ -32,7 +32,7 @@ for command, summary in COMMANDS.items():
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line with ``arguments`` (None: the process's own) and return the exit code."""
     try:
-        code = app(arguments, exit_on_error=False, print_error=False)
+        code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
     except CycloptsError as error:
         return _fail(f"{error} (see pegbar --help)")
     except (ValueError, OSError) as error:
