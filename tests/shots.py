@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pegbar import Drawing, Limb, write_annotations
+from pegbar import Drawing, Limb, read_annotations, write_annotations
 from pegbar.io.exr import write_exr
 from pegbar.io.frames import write_image
 
@@ -54,6 +54,14 @@ def make_shot(folder, count=4, extra=""):
     write_annotations(folder / "marks.json", marks)
     (folder / "shot.toml").write_text(SHOT.format(count=count) + extra)
     return folder / "shot.toml"
+
+
+def move_mark(shot, frame, name, place):
+    """Put one mark of ``frame`` somewhere else in the annotations beside ``shot``."""
+    path = shot.parent / "marks.json"
+    marks = read_annotations(path)
+    marks.markers[frame - 1, marks.names.index(name)] = place
+    write_annotations(path, marks)
 
 
 def draw(frame):

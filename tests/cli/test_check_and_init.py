@@ -1,9 +1,12 @@
+import dataclasses
+
 import numpy as np
 import pytest
 
+from pegbar import read_annotations, write_annotations
 from pegbar.cli.main import main
 from pegbar.io.frames import write_image
-from tests.shots import draw, make_shot
+from tests.shots import draw, make_shot, move_mark
 
 
 def run(*arguments):
@@ -25,8 +28,7 @@ def test_every_problem_is_reported_at_once(tmp_path, capsys):
     labels[0, 0] = (7, 7, 7)
     write_image(tmp_path / "l.0002.png", labels)
     (tmp_path / "p.0003.exr").unlink()
-    marks = tmp_path / "marks.json"
-    marks.write_text(marks.read_text().replace("[40, 27]", "[400, 27]"))
+    move_mark(shot, 4, "left_hand", (400, 27))
     assert run("check", shot) == 1
     captured = capsys.readouterr()
     lines = captured.err.splitlines()
@@ -44,12 +46,21 @@ def test_problems_of_the_shot_file_itself_come_with_lines(tmp_path, capsys):
     assert len(lines) == 3
     assert f"{shot}:6: drawing.frames: " in lines[0]
     assert f"{shot}:8: drawing.annotations: " in lines[1]
-    assert f"{shot}:18: drawing.palette: " in lines[2]
+    assert f"{shot}:18: drawing.palette.#ff0000: " in lines[2]
     assert '"tail"' in lines[2]
 
 
-def test_init_writes_a_shot_that_works(tmp_path, capsys):
+@pytest.mark.parametrize("told_by", ["file names", "annotations"])
+def test_init_writes_a_shot_that_works(tmp_path, capsys, told_by):
     make_shot(tmp_path).unlink()
+    if told_by == "file names":
+        for path in list(tmp_path.glob("l.*.png")):
+            path.rename(tmp_path / path.name.replace("l.", "labels."))
+    else:
+        marks = read_annotations(tmp_path / "marks.json")
+        pictures = [tuple(sorted(tmp_path.glob(f"{letter}.*.png"))) for letter in "dl"]
+        marks = dataclasses.replace(marks, images=pictures[0], segmentations=pictures[1])
+        write_annotations(tmp_path / "marks.json", marks)
     assert run("init", tmp_path) == 0
     text = (tmp_path / "shot.toml").read_text()
     assert 'frames = "1-4"' in text

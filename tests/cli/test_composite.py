@@ -7,7 +7,7 @@ import pytest
 from pegbar.cli.main import main
 from pegbar.io.exr import read_passes, write_exr
 from pegbar.io.frames import read_image, read_picture, write_image
-from tests.shots import HEIGHT, WIDTH, bar, draw, make_shot
+from tests.shots import HEIGHT, WIDTH, bar, draw, make_shot, move_mark
 
 RED = [255, 0, 0, 255]
 
@@ -63,8 +63,7 @@ def test_settings_and_marks_that_decide_the_result_make_frames_out_of_date(shot,
     capsys.readouterr()
     assert run("composite", shot) == 0
     assert "4 frames made" in capsys.readouterr().out
-    marks = shot.parent / "marks.json"
-    marks.write_text(marks.read_text().replace("[14, 27]", "[15, 27]"))
+    move_mark(shot, 2, "pelvis", (15, 27))
     assert run("composite", shot) == 0
     assert "1 frames made, 3 up to date" in capsys.readouterr().out
 

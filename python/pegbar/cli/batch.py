@@ -17,7 +17,7 @@ from pegbar.shot.stages import Stage
 
 
 @Parameter(name="*")
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class BatchOptions:
     """Options of every command that works through frames."""
 

@@ -22,9 +22,7 @@ def check(
     frames: Annotated[str | None, Parameter(help="Frames to check, like 1-48 (default: the shot's).")] = None,
     jobs: Annotated[int | None, Parameter(help="Worker processes (default: one a core).")] = None,
 ) -> int:
-    """Read all that a shot names and report every problem at once; nothing is written.
-
-    Example: pegbar check shot.toml
+    """Report every problem of a shot; see `pegbar check --help`.
 
     Parameters
     ----------
@@ -36,12 +34,14 @@ def check(
     except ShotError as error:
         print(error, file=sys.stderr)
         return 1
-    chosen, problems = BatchOptions(frames, jobs).select(plan.frames), 0
+    chosen = BatchOptions(frames=frames, jobs=jobs).select(plan.frames)
+    problems: dict[int, list[str]] = {}
     with closing(run_frames(CheckStage(plan), chosen, jobs=jobs)) as results, progress("check", len(chosen)) as advance:
         for result in results:
             advance()
-            for line in [result.error] if result.error else result.value:
-                problems += 1
-                print(line, file=sys.stderr)
-    print(f"check: {len(chosen)} frames read, {problems or 'no'} problem{'' if problems == 1 else 's'}")
-    return 1 if problems else 0
+            problems[result.frame] = [result.error] if result.error else list(result.value)
+    lines = [line for frame in sorted(problems) for line in problems[frame]]
+    for line in lines:
+        print(line, file=sys.stderr)
+    print(f"check: {len(chosen)} frames read, {len(lines) or 'no'} problem{'' if len(lines) == 1 else 's'}")
+    return 1 if lines else 0

@@ -15,7 +15,7 @@ from pegbar.shot.stages import CompositeStage
 
 
 @Parameter(name="*")
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class FileOptions:
     """What a shot file would say, for users who have none; each also replaces that key of a shot file."""
 
@@ -53,11 +53,7 @@ _PATHS = {"drawings", "labels", "annotations", "drawing_depth", "beauty", "depth
 
 
 def composite(shot: Path | None = None, files: FileOptions | None = None, options: BatchOptions | None = None) -> int:
-    """Composite drawing and rendered passes in depth order, frame by frame.
-
-    Example: pegbar composite shot.toml --frames 1-48
-    Example without a shot file: pegbar composite --drawings d.####.png --drawing-depth z.####.exr
-    --beauty b.####.exr --output out.####.png
+    """Composite a shot; see `pegbar composite --help`.
 
     Parameters
     ----------

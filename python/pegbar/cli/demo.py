@@ -28,9 +28,7 @@ def demo(
     length: Annotated[int, Parameter(help="Number of frames that the dance is spread over.")] = 48,
     jobs: Annotated[int | None, Parameter(help="Worker processes (default: one a core).")] = None,
 ) -> int:
-    """Make a sample shot from nothing, a drawn dancer with a hoop and a ribbon, and run every stage on it.
-
-    Example: pegbar demo demo
+    """Make the sample shot and finish it; see `pegbar demo --help`.
 
     Parameters
     ----------

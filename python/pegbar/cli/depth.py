@@ -9,10 +9,8 @@ from pegbar.shot.plan import open_shot
 from pegbar.shot.stages import DepthStage
 
 
-def depth(shot: Path, options: BatchOptions | None = None) -> int:
-    """Write the depth of every drawn pixel: an EXR map in metres, and a picture of it.
-
-    Example: pegbar depth shot.toml --frames 1-48
+def depth(shot: Path, *, options: BatchOptions | None = None) -> int:
+    """Write the depth of a shot's drawings; see `pegbar depth --help`.
 
     Parameters
     ----------

@@ -17,12 +17,7 @@ def init(
     output: Annotated[Path | None, Parameter(help="The shot file (default: FRAMES/shot.toml).")] = None,
     overwrite: Annotated[bool, Parameter(negative="", help="Replace a shot file that is there.")] = False,
 ) -> int:
-    """Write a shot file for a folder of drawn frames.
-
-    Label pictures, annotations and rendered passes beside the drawings are found by their names; what is missing
-    stands in the file as a comment to fill in.
-
-    Example: pegbar init my_shot
+    """Write a shot file for the drawn frames in a folder; see `pegbar init --help`.
 
     Parameters
     ----------

@@ -17,16 +17,40 @@ app = App(
     version=lambda: version("pegbar"),
     help_format="plaintext",
 )
-# The commands' modules are imported when they run, so the summaries stand here.
+# The commands' modules are imported when they run, so that help comes quickly; what it says stands here.
 COMMANDS = {
-    "init": "Write a shot file for a folder of drawn frames.",
-    "check": "Read all that a shot names and report every problem at once.",
-    "depth": "Write the depth of every drawn pixel.",
-    "composite": "Composite drawing and rendered passes in depth order.",
-    "demo": "Make a sample shot from nothing and run every stage on it.",
+    "init": """Write a shot file for a folder of drawn frames.
+
+Label pictures, annotations and rendered passes are found by their names; what is missing stands in the file as a
+comment to fill in.
+
+Example: pegbar init my_shot""",
+    "check": """Read all that a shot names and report every problem at once.
+
+Nothing is written.
+
+Example: pegbar check my_shot/shot.toml""",
+    "depth": """Write the depth of every drawn pixel.
+
+An EXR map in metres, and a picture of it.
+
+Example: pegbar depth my_shot/shot.toml --frames 1-48""",
+    "composite": """Composite drawing and rendered passes in depth order.
+
+Frames that are up to date are left alone, so run it again after a change or an interruption. Without a shot file give
+at least --drawings, --beauty and --output, and --drawing-depth or --labels with --annotations.
+
+Example: pegbar composite my_shot/shot.toml --frames 1-48 --keep-going
+
+Example: pegbar composite --drawings d.####.png --drawing-depth z.####.exr --beauty b.####.exr --output o.####.png""",
+    "demo": """Make a sample shot from nothing and run every stage on it.
+
+A drawn dancer with a hoop and a ribbon.
+
+Example: pegbar demo demo""",
 }
-for command, summary in COMMANDS.items():
-    app.command(f"pegbar.cli.{command}:{command}", name=command, help=summary)
+for command, text in COMMANDS.items():
+    app.command(f"pegbar.cli.{command}:{command}", name=command, help=text)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

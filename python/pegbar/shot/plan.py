@@ -135,13 +135,22 @@ class _Finder:
         try:
             return function(*arguments)
         except (ValueError, OSError) as error:
-            line = self.lines.get(tuple(key.split(".")))
+            path = getattr(error, "key", ()) or tuple(key.split("."))
+            line = self.lines.get(path)
             place = f"{self.source}:{line}" if line else self.source
-            self.problems.append(f"{place}: {key}: {error}")
+            self.problems.append(f"{place}: {'.'.join(path)}: {error}")
             return None
 
     def sequence(self, key: str, pattern: str | None) -> FrameSequence | None:
         return self.call(key, _find_sequence, self.folder, pattern) if pattern else None
+
+
+class _KeyedError(ValueError):
+    """A wrong value under a key of its own."""
+
+    def __init__(self, key: tuple[str, ...], problem: str) -> None:
+        self.key = key
+        super().__init__(problem)
 
 
 def _find_sequence(folder: Path, pattern: str) -> FrameSequence:
@@ -170,7 +179,7 @@ def _palette(settings: ShotFile, annotations: Drawing | None) -> Palette:
     for text, name in settings.drawing.palette.items():
         if name not in order:
             known_names = ", ".join(order) or "none: there are no annotations"
-            raise ValueError(f'{text} stands for "{name}", which is no limb of the annotations ({known_names})')
+            raise _KeyedError(("drawing", "palette", text), f'"{name}" is no limb of the annotations ({known_names})')
         known[parse_color(text)] = order[name] + 1
     background = [parse_color(text) for text in settings.drawing.background]
     return Palette(
