@@ -6,9 +6,9 @@
 
 use crate::band::Band;
 use crate::error::{KernelError, check_length};
-use crate::ink::{Ink, Pen};
+use crate::ink::{self, Ink, Pen};
 use crate::shade::{Shader, Toon, premultiplied};
-use crate::surface::{Face, Scene, Surface, View, seen_normals, visible};
+use crate::surface::{Face, Scene, Surface, View, visible};
 use glam::Vec4;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -41,7 +41,7 @@ impl Passes<'_> {
     }
 
     /// `samples` samples at a time, in parallel.
-    fn bands(&mut self, samples: usize) -> impl IndexedParallelIterator<Item = Passes<'_>> {
+    pub fn bands(&mut self, samples: usize) -> impl IndexedParallelIterator<Item = Passes<'_>> {
         let Passes { beauty, depth, coverage, object_id } = self;
         let colors = beauty.par_chunks_mut(samples).zip(depth.par_chunks_mut(samples));
         let others = coverage.par_chunks_mut(samples).zip(object_id.par_chunks_mut(samples));
@@ -56,11 +56,9 @@ impl Passes<'_> {
         check_length("object_id", size, self.object_id.len())
     }
 
-    fn fill_nothing(&mut self, samples: Range<usize>) {
-        self.beauty[samples.clone()].fill([0.0; 4]);
-        self.depth[samples.clone()].fill(f32::INFINITY);
-        self.coverage[samples.clone()].fill(0.0);
-        self.object_id[samples].fill(0);
+    fn fill_object(&mut self, samples: Range<usize>, object: u16) {
+        self.coverage[samples.clone()].fill(if object > 0 { 1.0 } else { 0.0 });
+        self.object_id[samples].fill(object);
     }
 }
 
@@ -92,8 +90,8 @@ pub fn render_passes(
     let (faces, surfaces) = visible(scene, view)?;
     let rows = BAND_ROWS.max(4 * view.margin);
     let bins = Bins::new(&faces, view, rows);
-    let normals = if ink.width > 0.0 { seen_normals(scene, &surfaces) } else { Vec::new() };
-    let pen = (ink.width > 0.0).then(|| Pen::new(&ink, &surfaces, &normals));
+    let facets = if ink.width > 0.0 { ink::facets(scene, &surfaces) } else { Vec::new() };
+    let pen = (ink.width > 0.0).then(|| Pen::new(&ink, &surfaces, &facets));
     let job = Job { view, faces: &faces, surfaces: &surfaces, bins, shader, ink, pen };
     out.bands((view.width * rows).max(1)).enumerate().for_each_init(
         || (Band::new(view, rows + 2 * view.margin), Vec::new()),
@@ -120,21 +118,29 @@ impl Job<'_> {
     }
 
     fn shade_row(&self, band: &Band, row: i32, out: &mut Passes<'_>) {
-        let mut column = 0;
+        let (mut column, mut since, mut object) = (0, 0, 0);
         for run in band.surface[band.samples_of(row)].chunk_by(|a, b| a == b) {
             let samples = column..column + run.len();
-            match self.surfaces.get((run[0] as usize).wrapping_sub(1)) {
-                None => out.fill_nothing(samples.clone()),
-                Some(surface) => {
-                    let x = column as i32;
-                    self.shader.run(surface, x, row, &mut out.beauty[samples.clone()]);
-                    fill_depth(surface, x, row, &mut out.depth[samples.clone()]);
-                    out.coverage[samples.clone()].fill(1.0);
-                    out.object_id[samples.clone()].fill(surface.object);
+            let surface = self.surfaces.get((run[0] as usize).wrapping_sub(1));
+            let (beauty, depth) = (&mut out.beauty[samples.clone()], &mut out.depth[samples.clone()]);
+            match surface {
+                None => {
+                    beauty.fill([0.0; 4]);
+                    depth.fill(f32::INFINITY);
                 }
+                Some(surface) => {
+                    fill_depth(surface, column as i32, row, depth);
+                    self.shader.run(surface, column as i32, row, depth, beauty);
+                }
+            }
+            let here = surface.map_or(0, |surface| surface.object);
+            if here != object {
+                out.fill_object(since..column, object);
+                (since, object) = (column, here);
             }
             column = samples.end;
         }
+        out.fill_object(since..column, object);
     }
 
     fn ink_row(&self, band: &Band, owners: &[u32], row: i32, out: &mut Passes<'_>) {
