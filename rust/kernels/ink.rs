@@ -234,3 +234,38 @@ fn stamp(reaches: impl Fn(f32) -> bool, most: i32) -> Vec<[i32; 2]> {
     let steps = (-most..=most).flat_map(|down| (-most..=most).map(move |right| [down, right]));
     steps.filter(|[down, right]| reaches(((down * down + right * right) as f32).sqrt())).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_margin_holds_the_line_and_the_sample_that_draws_it() {
+        let ink = |width| Ink { width, color: [0.0; 4], crease_angle: 1.0, depth_jump: 0.0 };
+        assert_eq!([0.0, 0.2, 1.0, 3.5].map(|width| ink(width).margin()), [0, 1, 2, 5]);
+    }
+
+    #[test]
+    fn a_crease_is_as_wide_as_asked_from_both_sides() {
+        for width in 1..6_u8 {
+            let ink = Ink { width: f32::from(width), color: [0.0; 4], crease_angle: 1.0, depth_jump: 0.0 };
+            let pen = Pen::new(&ink, &[], &[]);
+            let depth_of =
+                |stroke: Stroke| pen.stamps[stroke as usize].iter().filter(|s| s[0] == 0 && s[1] >= 0).count();
+            let thickness = depth_of(Stroke::CreaseNearer) + depth_of(Stroke::CreaseFarther);
+            assert_eq!(thickness, usize::from(width));
+            assert_eq!(depth_of(Stroke::Outline), usize::from(width) + 1, "its own sample counts but is not drawn");
+        }
+    }
+
+    #[test]
+    fn a_difference_is_seen_at_every_place() {
+        let same = [3u32; 8];
+        assert!(!differs(&same, &same));
+        for place in 0..8 {
+            let mut other = same;
+            other[place] = 1 << 31;
+            assert!(differs(&same, &other));
+        }
+    }
+}

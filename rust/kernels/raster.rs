@@ -219,3 +219,83 @@ fn bands_of(face: &Face, view: &View, rows: usize) -> Range<usize> {
     let last = (bottom + margin).clamp(0, height) as usize;
     first..last.div_ceil(rows)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    const NO_INK: Ink = Ink { width: 0.0, color: [0.0; 4], crease_angle: 7.0, depth_jump: 0.01 };
+
+    /// Depths and objects of squares (left, right, depth) that are two pixels high, in a picture of `height` rows.
+    fn render(squares: &[[f64; 3]], height: usize, ink: Ink) -> Result<(Vec<f32>, Vec<u16>), KernelError> {
+        let (mut vertices, mut triangles, mut objects) = (Vec::new(), Vec::new(), Vec::new());
+        for (index, [left, right, z]) in squares.iter().enumerate() {
+            let first = vertices.len() as u32;
+            let corners = [[*left, 0.0], [*right, 0.0], [*right, 2.0], [*left, 2.0]];
+            vertices.extend(corners.map(|[x, y]| DVec3::new(x * z, y * z, *z)));
+            triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+            objects.extend([index as u16 + 1; 2]);
+        }
+        let colors = vec![[1.0; 4]; vertices.len()];
+        let scene =
+            Scene { vertices: &vertices, triangles: &triangles, colors: &colors, normals: &[], objects: &objects };
+        let matrix = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
+        let view = View { matrix, near: 0.5, width: 4, height, margin: 0 };
+        let size = 4 * height;
+        let (mut beauty, mut depth) = (vec![[9.0; 4]; size], vec![9.0; size]);
+        let (mut coverage, mut object_id) = (vec![9.0; size], vec![9; size]);
+        let out = Passes { beauty: &mut beauty, depth: &mut depth, coverage: &mut coverage, object_id: &mut object_id };
+        render_passes(&scene, &view, Toon { light: DVec3::Y, bands: &[] }, ink, out)?;
+        for (pixel, object) in object_id.iter().enumerate() {
+            let covered = f32::from(u8::from(*object > 0));
+            assert_eq!((coverage[pixel], beauty[pixel][3], depth[pixel].is_finite()), (covered, covered, *object > 0));
+        }
+        Ok((depth, object_id))
+    }
+
+    #[test]
+    fn the_nearer_stays_and_of_equals_the_earlier() {
+        let got = render(&[[1.0, 4.0, 3.0], [2.0, 4.0, 2.0], [3.0, 4.0, 2.0]], 3, NO_INK);
+        let inf = f32::INFINITY;
+        let (row, ids) = ([inf, 3.0, 2.0, 2.0], [0, 1, 2, 2]);
+        let want = ([row, row, [inf; 4]].concat(), [ids, ids, [0; 4]].concat());
+        assert_eq!(got, Ok(want));
+    }
+
+    #[test]
+    fn every_sample_is_written_in_bands_without_faces_too() {
+        let got = render(&[], 3 * BAND_ROWS + 1, NO_INK).map(|(depth, _)| depth.iter().all(|z| z.is_infinite()));
+        assert_eq!(got, Ok(true));
+        assert!(render(&[], 0, NO_INK).is_ok());
+    }
+
+    #[test]
+    fn a_line_grows_below_its_object_with_its_depth() {
+        let ink = Ink { width: 1.0, color: [0.0, 0.0, 0.0, 1.0], ..NO_INK };
+        let inf = f32::INFINITY;
+        let got = render(&[[1.0, 2.0, 3.0]], 4, ink).map(|(depth, _)| depth);
+        assert_eq!(got, Ok([[3.0, 3.0, 3.0, inf], [3.0, 3.0, 3.0, inf], [3.0, 3.0, 3.0, inf], [inf; 4]].concat()));
+    }
+
+    #[test]
+    fn lists_and_options_that_do_not_fit_are_refused() {
+        assert!(matches!(
+            render(&[], 4, Ink { width: f32::NAN, ..NO_INK }),
+            Err(KernelError::Argument { argument: "ink", .. })
+        ));
+        let (matrix, width, height) = ([[0.0; 4]; 3], LARGEST_SIDE + 1, 1);
+        let view = View { matrix, near: 1.0, width, height, margin: 0 };
+        assert!(matches!(check_view(&view), Err(KernelError::Argument { argument: "camera", .. })));
+        let scene = Scene {
+            vertices: &[DVec3::ZERO],
+            triangles: &[[0, 0, 1]],
+            colors: &[[0.0; 4]],
+            normals: &[],
+            objects: &[1],
+        };
+        assert!(matches!(scene.check(), Err(KernelError::Item { argument: "triangles", index: 0, .. })));
+        let scene = Scene { triangles: &[[0; 3]], objects: &[], ..scene };
+        assert!(matches!(scene.check(), Err(KernelError::Length { argument: "objects", wanted: 1, got: 0 })));
+    }
+}

@@ -104,3 +104,34 @@ impl<'a> Shader<'a> {
 pub fn premultiplied(color: Vec4) -> [f32; 4] {
     (color * color.w).truncate().extend(color.w).to_array()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bands_begin_where_the_cosine_is_even() {
+        let scene = Scene { vertices: &[], triangles: &[], colors: &[], normals: &[], objects: &[] };
+        let toon = Toon { light: DVec3::new(0.0, 3.0, 0.0), bands: &[0.1, 0.2, 0.3, 0.4] };
+        let Ok(shader) = Shader::new(&scene, toon) else { unreachable!() };
+        // A normal of length 2 turns from the light's far side to the light: products with it in w.
+        let along = Vec4::new(-1.01, -0.99, -0.01, 0.01);
+        let got = shader.factors(Vec4::new(2.0, 0.0, 0.0, 0.0), Vec4::new(0.0, 0.0, 0.0, 1.0), along);
+        assert_eq!(got, Vec4::new(0.1, 0.2, 0.2, 0.3));
+        let got = shader.factors(Vec4::new(2.0, 0.0, 0.0, 0.0), Vec4::new(0.0, 0.0, 0.0, 1.0), -along);
+        assert_eq!(got, Vec4::new(0.4, 0.3, 0.3, 0.2));
+    }
+
+    #[test]
+    fn light_bands_and_normals_are_checked() {
+        let scene = Scene { vertices: &[DVec3::X], triangles: &[], colors: &[], normals: &[], objects: &[] };
+        let refused = |light, bands| match Shader::new(&scene, Toon { light, bands }) {
+            Err(KernelError::Argument { argument, .. } | KernelError::Item { argument, .. }) => argument,
+            _ => "",
+        };
+        assert_eq!(refused(DVec3::ZERO, &[]), "light");
+        assert_eq!(refused(DVec3::X, &[1.0, f32::NAN]), "bands");
+        assert_eq!(refused(DVec3::X, &[1.0]), "normals");
+        assert_eq!(refused(DVec3::X, &[]), "");
+    }
+}

@@ -266,3 +266,55 @@ pub fn visible(scene: &Scene<'_>, view: &View) -> Result<(Vec<Face>, Vec<Surface
     let surfaces = triangles.into_par_iter().map(|t| Surface::new(scene, t, corners(t), view)).collect();
     Ok((faces, surfaces))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const VIEW: View = View {
+        matrix: [[8.0, 0.0, 4.0, 0.0], [0.0, 8.0, 4.0, 0.0], [0.0, 0.0, 1.0, 0.0]],
+        near: 0.5,
+        width: 8,
+        height: 8,
+        margin: 0,
+    };
+
+    fn surface(vertices: [DVec3; 3]) -> Surface {
+        let scene =
+            Scene { vertices: &vertices, triangles: &[[0, 1, 2]], colors: &[[1.0; 4]; 3], normals: &[], objects: &[1] };
+        let corners = VIEW.project(&vertices).unwrap_or_default();
+        Surface::new(&scene, 0, [corners[0], corners[1], corners[2]], &VIEW)
+    }
+
+    #[test]
+    fn depth_is_where_the_ray_meets_the_plane() {
+        // The plane z = 2 + x: a ray (u, v, 1) meets it at z = 2 / (1 - u).
+        let slanted = surface([DVec3::new(-1., -1., 1.), DVec3::new(1., -1., 3.), DVec3::new(0., 1., 2.)]);
+        for (x, y) in [(2, 2), (4, 4), (5, 3)] {
+            let u = (f64::from(x) - 4.0) / 8.0;
+            assert!((slanted.depth(x, y) - 2.0 / (1.0 - u)).abs() < 1e-12);
+            let (shares, _) = slanted.shares(x, y);
+            assert!((shares.element_sum().recip() - slanted.depth(x, y)).abs() < 1e-12);
+        }
+        assert_eq!((slanted.depth(-999, 4), slanted.depth(11, 4)), (1.0, 3.0));
+    }
+
+    #[test]
+    fn a_triangle_seen_from_its_edge_has_its_nearest_depth() {
+        let edge_on = surface([DVec3::new(0., 0., 1.), DVec3::new(0., 0., 2.), DVec3::new(0., 1., 2.)]);
+        assert_eq!(edge_on.depth(3, 5), 1.0);
+        assert!(edge_on.shares(3, 5).0.is_finite());
+    }
+
+    #[test]
+    fn facing_follows_the_winding() {
+        let corners = [DVec3::new(0., 0., 2.), DVec3::new(1., 0., 2.), DVec3::new(0., 1., 2.)];
+        assert_eq!(surface(corners).facing, -1.0);
+        assert_eq!(surface([corners[1], corners[0], corners[2]]).facing, 1.0);
+    }
+
+    #[test]
+    fn the_first_sample_is_the_ceiling() {
+        assert_eq!([-257, -256, -1, 0, 1, 256].map(first_sample), [-1, -1, 0, 0, 1, 1]);
+    }
+}
