@@ -4,7 +4,8 @@
 //! upper end and above its lower one: the top-left rule. The outlines' columns are walked row by row in integers without
 //! rounding, so two faces with a common edge never leave out and never share a sample.
 
-use crate::surface::{Face, SUBPIXELS, Surface, View};
+use crate::surface::{Face, SUBPIXELS, Surface, View, first_sample};
+use glam::Vec4;
 use std::ops::Range;
 
 /// The first sample at or right of an edge, row by row: `column` is the exact ceiling of the edge's place.
@@ -41,6 +42,9 @@ impl Edge {
     }
 }
 
+/// Samples that are compared at a time; rows begin and end at whole groups.
+const LANES: usize = 4;
+
 /// Rows of a picture with its margin: the nearest surface of every sample and its 1/z.
 pub struct Band {
     /// Picture row of the first row held.
@@ -49,20 +53,23 @@ pub struct Band {
     pub rows: usize,
     /// Columns held, the margins' included.
     pub width: usize,
-    /// Columns left of the picture's first.
-    pub margin: i32,
     /// 1/z, 0 where nothing is.
     pub reciprocal: Vec<f32>,
     /// Index of the surface and one, 0 where nothing is.
     pub surface: Vec<u32>,
+    /// Columns left of the picture's first.
+    margin: usize,
+    /// Columns of the picture.
+    picture: usize,
 }
 
 impl Band {
     /// A band for at most `rows` rows of a view.
     pub fn new(view: &View, rows: usize) -> Self {
-        let width = view.width + 2 * view.margin;
-        let size = width * rows;
-        Band { top: 0, rows: 0, width, margin: view.margin as i32, reciprocal: vec![0.0; size], surface: vec![0; size] }
+        let margin = view.margin.next_multiple_of(LANES);
+        let width = (margin + view.width + view.margin).next_multiple_of(LANES);
+        let (reciprocal, surface) = (vec![0.0; width * rows], vec![0; width * rows]);
+        Band { top: 0, rows: 0, width, reciprocal, surface, margin, picture: view.width }
     }
 
     /// Empties the band and puts it over other rows.
@@ -75,13 +82,13 @@ impl Band {
 
     /// Column and row in the picture of a sample held.
     pub fn place_of(&self, sample: usize) -> [i32; 2] {
-        [(sample % self.width) as i32 - self.margin, (sample / self.width) as i32 + self.top]
+        [(sample % self.width) as i32 - self.margin as i32, (sample / self.width) as i32 + self.top]
     }
 
     /// The samples held of the picture's columns in one of its rows.
     pub fn samples_of(&self, row: i32) -> Range<usize> {
-        let (start, margin) = ((row - self.top) as usize * self.width, self.margin as usize);
-        start + margin..start + self.width - margin
+        let start = (row - self.top) as usize * self.width + self.margin;
+        start..start + self.picture
     }
 
     /// Draws the faces in turn: the nearer stays, of equals the earlier.
@@ -94,11 +101,12 @@ impl Band {
     fn draw_face(&mut self, face: &Face, surface: &Surface) {
         let [upper, middle, lower] = face.corners;
         let (first, last) = face.rows();
-        let turn = crate::surface::first_sample(middle[1]);
+        let turn = first_sample(middle[1]);
         let (top, bottom) = (first.max(self.top), last.min(self.top + self.rows as i32));
         if top >= bottom {
             return;
         }
+        let pen = Pen::new(surface, face.surface + 1);
         let mut long = Edge::new(upper, lower, top);
         let turns_right = is_right(upper, lower, middle);
         for (from, to, rows) in [(upper, middle, top..turn.min(bottom)), (middle, lower, turn.max(top)..bottom)] {
@@ -107,34 +115,65 @@ impl Band {
             }
             let mut short = Edge::new(from, to, rows.start);
             for row in rows {
-                let (left, right) = if turns_right { (long.column, short.column) } else { (short.column, long.column) };
-                self.draw_span(row, left, right, surface, face.surface + 1);
+                let (left, right) = if turns_right { (&long, &short) } else { (&short, &long) };
+                self.draw_span(row, left.column, right.column, &pen);
                 long.next_row();
                 short.next_row();
             }
         }
     }
 
-    fn draw_span(&mut self, row: i32, left: i64, right: i64, surface: &Surface, name: u32) {
-        let margin = i64::from(self.margin);
+    fn draw_span(&mut self, row: i32, left: i64, right: i64, pen: &Pen) {
+        let margin = self.margin as i64;
         let (left, right) = (left.max(-margin), right.min(self.width as i64 - margin));
         if left >= right {
             return;
         }
         let start = (row - self.top) as usize * self.width;
-        let span = start + (left + margin) as usize..start + (right + margin) as usize;
-        let (from, step) = surface.reciprocal(left as i32, row);
-        let (from, step) = (from as f32, step as f32);
+        let (first, last) = ((left + margin) as usize, (right + margin) as usize);
+        let groups = first / LANES * LANES..last.next_multiple_of(LANES);
+        let nearest = self.reciprocal[start + groups.start..start + groups.end].as_chunks_mut::<LANES>().0;
+        let owners = self.surface[start + groups.start..start + groups.end].as_chunks_mut::<LANES>().0;
+        pen.fill([left as i32, row], (last - first) as f32, first - groups.start, nearest, owners);
+    }
+}
+
+/// What a span of one face writes.
+struct Pen<'a> {
+    surface: &'a Surface,
+    least: Vec4,
+    most: Vec4,
+    name: Vec4,
+}
+
+impl<'a> Pen<'a> {
+    fn new(surface: &'a Surface, name: u32) -> Self {
         let (least, most) = surface.range();
-        let (least, most) = (least as f32, most as f32);
-        let samples = self.reciprocal[span.clone()].iter_mut().zip(&mut self.surface[span]);
-        for (i, (nearest, owner)) in samples.enumerate() {
-            let here = from + i as i32 as f32 * step;
-            let here = if here < least { least } else { here };
-            let here = if here > most { most } else { here };
-            let wins = here > *nearest;
-            *nearest = if wins { here } else { *nearest };
-            *owner = if wins { name } else { *owner };
+        // Names travel as the bits of floats, so that one selection serves depths and names.
+        let [least, most, name] = [least as f32, most as f32, f32::from_bits(name)].map(Vec4::splat);
+        Pen { surface, least, most, name }
+    }
+
+    /// Fills `length` samples from `place` on, which is the `lead`-th of the groups given.
+    fn fill(
+        &self,
+        place: [i32; 2],
+        length: f32,
+        lead: usize,
+        nearest: &mut [[f32; LANES]],
+        owners: &mut [[u32; LANES]],
+    ) {
+        let (from, step) = self.surface.reciprocal(place[0], place[1]);
+        let (from, step, length) = (Vec4::splat(from as f32), Vec4::splat(step as f32), Vec4::splat(length));
+        let mut along = Vec4::new(0.0, 1.0, 2.0, 3.0) - lead as f32;
+        for (nearest, owner) in nearest.iter_mut().zip(owners) {
+            let here = (from + along * step).max(self.least).min(self.most);
+            let held = Vec4::from_array(*nearest);
+            let wins = here.cmpgt(held) & along.cmpge(Vec4::ZERO) & along.cmplt(length);
+            *nearest = Vec4::select(wins, here, held).to_array();
+            let name = Vec4::select(wins, self.name, Vec4::from_array(owner.map(f32::from_bits)));
+            *owner = name.to_array().map(f32::to_bits);
+            along += LANES as f32;
         }
     }
 }
@@ -155,7 +194,7 @@ mod tests {
         for (from, to) in
             [([3, 5], [1000, 2560]), ([1000, -700], [-5000, 2561]), ([0, 0], [0, 512]), ([7, 0], [9, 256])]
         {
-            let rows = crate::surface::first_sample(from[1])..crate::surface::first_sample(to[1]);
+            let rows = first_sample(from[1])..first_sample(to[1]);
             let mut edge = Edge::new(from, to, rows.start);
             for row in rows {
                 let (across, down) = (i64::from(to[0] - from[0]), i64::from(to[1] - from[1]));

@@ -6,14 +6,15 @@
 
 use crate::band::Band;
 use crate::error::KernelError;
-use crate::surface::Surface;
+use crate::surface::{Scene, Surface};
 use glam::Vec3;
+use rayon::prelude::*;
 
 /// Widest line in samples.
 const WIDEST: f32 = 256.0;
 
 /// Neighbours compared at a time.
-const CHUNK: usize = 32;
+const CHUNK: usize = 8;
 
 /// How lines are drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,18 +58,35 @@ enum Stroke {
     CreaseFarther,
 }
 
+/// What of a surface tells whether its neighbour goes on: small, since every pair of neighbours asks.
+#[derive(Clone, Copy)]
+pub struct Facet {
+    /// Unit normal on the side that the camera sees.
+    normal: Vec3,
+    object: u16,
+}
+
+/// The surfaces' facets.
+pub fn facets(scene: &Scene<'_>, surfaces: &[Surface]) -> Vec<Facet> {
+    let facet = |s: &Surface| {
+        let normal = scene.face_normal(s.triangle).normalize_or_zero().as_vec3() * s.facing;
+        Facet { normal, object: s.object }
+    };
+    surfaces.par_iter().map(facet).collect()
+}
+
 /// Finds and draws the lines of one band after another.
 pub struct Pen<'a> {
     surfaces: &'a [Surface],
-    normals: &'a [Vec3],
+    facets: &'a [Facet],
     least_cosine: f32,
-    depth_jump: f32,
+    greatest_ratio: f32,
     stamps: [Vec<[i32; 2]>; 3],
 }
 
 impl<'a> Pen<'a> {
-    /// A pen for surfaces with unit normals.
-    pub fn new(ink: &Ink, surfaces: &'a [Surface], normals: &'a [Vec3]) -> Self {
+    /// A pen for surfaces and their facets.
+    pub fn new(ink: &Ink, surfaces: &'a [Surface], facets: &'a [Facet]) -> Self {
         // A sample's centre lies half a sample from the rim that it draws.
         let on_surface = ink.width * 0.5 - 0.5;
         let stamps = [
@@ -77,7 +95,7 @@ impl<'a> Pen<'a> {
             stamp(|distance| distance < on_surface, ink.margin() as i32),
         ];
         let least_cosine = if ink.crease_angle > std::f32::consts::PI { -2.0 } else { ink.crease_angle.cos() };
-        Pen { surfaces, normals, least_cosine, depth_jump: ink.depth_jump, stamps }
+        Pen { surfaces, facets, least_cosine, greatest_ratio: 1.0 + ink.depth_jump, stamps }
     }
 
     /// Fills `owners`: for every sample of the band the sample that draws on it and one, or 0.
@@ -120,6 +138,9 @@ impl<'a> Pen<'a> {
 
     /// What two neighbours of different surfaces draw; of equally near ones the first counts as the nearer.
     fn pair(&self, band: &Band, first: usize, second: usize, found: &mut Vec<(u32, Stroke)>) {
+        if self.goes_on_between(band, first, second) {
+            return;
+        }
         let swap = band.reciprocal[second] > band.reciprocal[first];
         let (nearer, farther) = if swap { (second, first) } else { (first, second) };
         let ends = self.ends_between(band, nearer, farther);
@@ -140,14 +161,14 @@ impl<'a> Pen<'a> {
             return true;
         }
         let [here, there] = [first, second].map(|sample| f64::from(band.reciprocal[sample]));
-        let jump = f64::from(self.depth_jump);
-        if a.triangle == b.triangle || here.max(there) <= here.min(there) * (1.0 + jump) {
+        let ratio = f64::from(self.greatest_ratio);
+        if a.triangle == b.triangle || here.max(there) <= here.min(there) * ratio {
             return false;
         }
         // A steep surface goes on where either triangle's plane, continued, meets the other sample.
         let meets = |surface: &Surface, sample: usize, reciprocal: f64| {
             let [x, y] = band.place_of(sample);
-            (surface.reciprocal(x, y).0 - reciprocal).abs() <= jump * reciprocal
+            (surface.reciprocal(x, y).0 - reciprocal).abs() <= (ratio - 1.0) * reciprocal
         };
         !meets(a, second, there) && !meets(b, first, here)
     }
@@ -158,10 +179,21 @@ impl<'a> Pen<'a> {
         band.surface[farther] > 0 && surface.reciprocal(x, y).0 < f64::from(band.reciprocal[farther])
     }
 
+    /// Whether two neighbours surely draw nothing; most pairs are told by this alone.
+    fn goes_on_between(&self, band: &Band, first: usize, second: usize) -> bool {
+        let facet = |sample: usize| self.facets.get((band.surface[sample] as usize).wrapping_sub(1));
+        let (Some(a), Some(b)) = (facet(first), facet(second)) else { return false };
+        let [here, there] = [first, second].map(|sample| band.reciprocal[sample]);
+        a.object == b.object
+            && a.normal.dot(b.normal) > self.least_cosine
+            && here <= there * self.greatest_ratio
+            && there <= here * self.greatest_ratio
+    }
+
     fn folds_between(&self, band: &Band, first: usize, second: usize) -> bool {
-        let normal = |sample: usize| self.normals.get((band.surface[sample] as usize).wrapping_sub(1));
-        let (Some(a), Some(b)) = (normal(first), normal(second)) else { return false };
-        a.dot(*b) <= self.least_cosine
+        let facet = |sample: usize| self.facets.get((band.surface[sample] as usize).wrapping_sub(1));
+        let (Some(a), Some(b)) = (facet(first), facet(second)) else { return false };
+        a.normal.dot(b.normal) <= self.least_cosine
     }
 
     fn surface(&self, band: &Band, sample: usize) -> Option<&Surface> {
@@ -201,4 +233,39 @@ fn differs(a: &[u32], b: &[u32]) -> bool {
 fn stamp(reaches: impl Fn(f32) -> bool, most: i32) -> Vec<[i32; 2]> {
     let steps = (-most..=most).flat_map(|down| (-most..=most).map(move |right| [down, right]));
     steps.filter(|[down, right]| reaches(((down * down + right * right) as f32).sqrt())).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_margin_holds_the_line_and_the_sample_that_draws_it() {
+        let ink = |width| Ink { width, color: [0.0; 4], crease_angle: 1.0, depth_jump: 0.0 };
+        assert_eq!([0.0, 0.2, 1.0, 3.5].map(|width| ink(width).margin()), [0, 1, 2, 5]);
+    }
+
+    #[test]
+    fn a_crease_is_as_wide_as_asked_from_both_sides() {
+        for width in 1..6_u8 {
+            let ink = Ink { width: f32::from(width), color: [0.0; 4], crease_angle: 1.0, depth_jump: 0.0 };
+            let pen = Pen::new(&ink, &[], &[]);
+            let depth_of =
+                |stroke: Stroke| pen.stamps[stroke as usize].iter().filter(|s| s[0] == 0 && s[1] >= 0).count();
+            let thickness = depth_of(Stroke::CreaseNearer) + depth_of(Stroke::CreaseFarther);
+            assert_eq!(thickness, usize::from(width));
+            assert_eq!(depth_of(Stroke::Outline), usize::from(width) + 1, "its own sample counts but is not drawn");
+        }
+    }
+
+    #[test]
+    fn a_difference_is_seen_at_every_place() {
+        let same = [3u32; 8];
+        assert!(!differs(&same, &same));
+        for place in 0..8 {
+            let mut other = same;
+            other[place] = 1 << 31;
+            assert!(differs(&same, &other));
+        }
+    }
 }

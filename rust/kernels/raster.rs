@@ -6,9 +6,9 @@
 
 use crate::band::Band;
 use crate::error::{KernelError, check_length};
-use crate::ink::{Ink, Pen};
+use crate::ink::{self, Ink, Pen};
 use crate::shade::{Shader, Toon, premultiplied};
-use crate::surface::{Face, Scene, Surface, View, seen_normals, visible};
+use crate::surface::{Face, Scene, Surface, View, visible};
 use glam::Vec4;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -41,7 +41,7 @@ impl Passes<'_> {
     }
 
     /// `samples` samples at a time, in parallel.
-    fn bands(&mut self, samples: usize) -> impl IndexedParallelIterator<Item = Passes<'_>> {
+    pub fn bands(&mut self, samples: usize) -> impl IndexedParallelIterator<Item = Passes<'_>> {
         let Passes { beauty, depth, coverage, object_id } = self;
         let colors = beauty.par_chunks_mut(samples).zip(depth.par_chunks_mut(samples));
         let others = coverage.par_chunks_mut(samples).zip(object_id.par_chunks_mut(samples));
@@ -56,11 +56,9 @@ impl Passes<'_> {
         check_length("object_id", size, self.object_id.len())
     }
 
-    fn fill_nothing(&mut self, samples: Range<usize>) {
-        self.beauty[samples.clone()].fill([0.0; 4]);
-        self.depth[samples.clone()].fill(f32::INFINITY);
-        self.coverage[samples.clone()].fill(0.0);
-        self.object_id[samples].fill(0);
+    fn fill_object(&mut self, samples: Range<usize>, object: u16) {
+        self.coverage[samples.clone()].fill(if object > 0 { 1.0 } else { 0.0 });
+        self.object_id[samples].fill(object);
     }
 }
 
@@ -92,8 +90,8 @@ pub fn render_passes(
     let (faces, surfaces) = visible(scene, view)?;
     let rows = BAND_ROWS.max(4 * view.margin);
     let bins = Bins::new(&faces, view, rows);
-    let normals = if ink.width > 0.0 { seen_normals(scene, &surfaces) } else { Vec::new() };
-    let pen = (ink.width > 0.0).then(|| Pen::new(&ink, &surfaces, &normals));
+    let facets = if ink.width > 0.0 { ink::facets(scene, &surfaces) } else { Vec::new() };
+    let pen = (ink.width > 0.0).then(|| Pen::new(&ink, &surfaces, &facets));
     let job = Job { view, faces: &faces, surfaces: &surfaces, bins, shader, ink, pen };
     out.bands((view.width * rows).max(1)).enumerate().for_each_init(
         || (Band::new(view, rows + 2 * view.margin), Vec::new()),
@@ -120,21 +118,29 @@ impl Job<'_> {
     }
 
     fn shade_row(&self, band: &Band, row: i32, out: &mut Passes<'_>) {
-        let mut column = 0;
+        let (mut column, mut since, mut object) = (0, 0, 0);
         for run in band.surface[band.samples_of(row)].chunk_by(|a, b| a == b) {
             let samples = column..column + run.len();
-            match self.surfaces.get((run[0] as usize).wrapping_sub(1)) {
-                None => out.fill_nothing(samples.clone()),
-                Some(surface) => {
-                    let x = column as i32;
-                    self.shader.run(surface, x, row, &mut out.beauty[samples.clone()]);
-                    fill_depth(surface, x, row, &mut out.depth[samples.clone()]);
-                    out.coverage[samples.clone()].fill(1.0);
-                    out.object_id[samples.clone()].fill(surface.object);
+            let surface = self.surfaces.get((run[0] as usize).wrapping_sub(1));
+            let (beauty, depth) = (&mut out.beauty[samples.clone()], &mut out.depth[samples.clone()]);
+            match surface {
+                None => {
+                    beauty.fill([0.0; 4]);
+                    depth.fill(f32::INFINITY);
                 }
+                Some(surface) => {
+                    fill_depth(surface, column as i32, row, depth);
+                    self.shader.run(surface, column as i32, row, depth, beauty);
+                }
+            }
+            let here = surface.map_or(0, |surface| surface.object);
+            if here != object {
+                out.fill_object(since..column, object);
+                (since, object) = (column, here);
             }
             column = samples.end;
         }
+        out.fill_object(since..column, object);
     }
 
     fn ink_row(&self, band: &Band, owners: &[u32], row: i32, out: &mut Passes<'_>) {
@@ -212,4 +218,84 @@ fn bands_of(face: &Face, view: &View, rows: usize) -> Range<usize> {
     let first = (top - margin).clamp(0, height) as usize / rows;
     let last = (bottom + margin).clamp(0, height) as usize;
     first..last.div_ceil(rows)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    const NO_INK: Ink = Ink { width: 0.0, color: [0.0; 4], crease_angle: 7.0, depth_jump: 0.01 };
+
+    /// Depths and objects of squares (left, right, depth) that are two pixels high, in a picture of `height` rows.
+    fn render(squares: &[[f64; 3]], height: usize, ink: Ink) -> Result<(Vec<f32>, Vec<u16>), KernelError> {
+        let (mut vertices, mut triangles, mut objects) = (Vec::new(), Vec::new(), Vec::new());
+        for (index, [left, right, z]) in squares.iter().enumerate() {
+            let first = vertices.len() as u32;
+            let corners = [[*left, 0.0], [*right, 0.0], [*right, 2.0], [*left, 2.0]];
+            vertices.extend(corners.map(|[x, y]| DVec3::new(x * z, y * z, *z)));
+            triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+            objects.extend([index as u16 + 1; 2]);
+        }
+        let colors = vec![[1.0; 4]; vertices.len()];
+        let scene =
+            Scene { vertices: &vertices, triangles: &triangles, colors: &colors, normals: &[], objects: &objects };
+        let matrix = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
+        let view = View { matrix, near: 0.5, width: 4, height, margin: 0 };
+        let size = 4 * height;
+        let (mut beauty, mut depth) = (vec![[9.0; 4]; size], vec![9.0; size]);
+        let (mut coverage, mut object_id) = (vec![9.0; size], vec![9; size]);
+        let out = Passes { beauty: &mut beauty, depth: &mut depth, coverage: &mut coverage, object_id: &mut object_id };
+        render_passes(&scene, &view, Toon { light: DVec3::Y, bands: &[] }, ink, out)?;
+        for (pixel, object) in object_id.iter().enumerate() {
+            let covered = f32::from(u8::from(*object > 0));
+            assert_eq!((coverage[pixel], beauty[pixel][3], depth[pixel].is_finite()), (covered, covered, *object > 0));
+        }
+        Ok((depth, object_id))
+    }
+
+    #[test]
+    fn the_nearer_stays_and_of_equals_the_earlier() {
+        let got = render(&[[1.0, 4.0, 3.0], [2.0, 4.0, 2.0], [3.0, 4.0, 2.0]], 3, NO_INK);
+        let inf = f32::INFINITY;
+        let (row, ids) = ([inf, 3.0, 2.0, 2.0], [0, 1, 2, 2]);
+        let want = ([row, row, [inf; 4]].concat(), [ids, ids, [0; 4]].concat());
+        assert_eq!(got, Ok(want));
+    }
+
+    #[test]
+    fn every_sample_is_written_in_bands_without_faces_too() {
+        let got = render(&[], 3 * BAND_ROWS + 1, NO_INK).map(|(depth, _)| depth.iter().all(|z| z.is_infinite()));
+        assert_eq!(got, Ok(true));
+        assert!(render(&[], 0, NO_INK).is_ok());
+    }
+
+    #[test]
+    fn a_line_grows_below_its_object_with_its_depth() {
+        let ink = Ink { width: 1.0, color: [0.0, 0.0, 0.0, 1.0], ..NO_INK };
+        let inf = f32::INFINITY;
+        let got = render(&[[1.0, 2.0, 3.0]], 4, ink).map(|(depth, _)| depth);
+        assert_eq!(got, Ok([[3.0, 3.0, 3.0, inf], [3.0, 3.0, 3.0, inf], [3.0, 3.0, 3.0, inf], [inf; 4]].concat()));
+    }
+
+    #[test]
+    fn lists_and_options_that_do_not_fit_are_refused() {
+        assert!(matches!(
+            render(&[], 4, Ink { width: f32::NAN, ..NO_INK }),
+            Err(KernelError::Argument { argument: "ink", .. })
+        ));
+        let (matrix, width, height) = ([[0.0; 4]; 3], LARGEST_SIDE + 1, 1);
+        let view = View { matrix, near: 1.0, width, height, margin: 0 };
+        assert!(matches!(check_view(&view), Err(KernelError::Argument { argument: "camera", .. })));
+        let scene = Scene {
+            vertices: &[DVec3::ZERO],
+            triangles: &[[0, 0, 1]],
+            colors: &[[0.0; 4]],
+            normals: &[],
+            objects: &[1],
+        };
+        assert!(matches!(scene.check(), Err(KernelError::Item { argument: "triangles", index: 0, .. })));
+        let scene = Scene { triangles: &[[0; 3]], objects: &[], ..scene };
+        assert!(matches!(scene.check(), Err(KernelError::Length { argument: "objects", wanted: 1, got: 0 })));
+    }
 }

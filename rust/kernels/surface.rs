@@ -7,7 +7,7 @@
 
 use crate::clip;
 use crate::error::{KernelError, check_length};
-use glam::{DMat4, DVec3, DVec4, Vec3};
+use glam::{DMat4, DVec3, DVec4};
 use rayon::prelude::*;
 
 /// Steps of a snapped coordinate in one pixel.
@@ -106,6 +106,7 @@ pub struct Surface {
     at: DVec3,
     dx: DVec3,
     dy: DVec3,
+    sum: [f64; 3],
     least: f64,
     most: f64,
 }
@@ -130,15 +131,17 @@ impl Surface {
         let column = |pick: fn(&DVec3) -> f64, flat: f64| {
             if sound { DVec3::from_array([0, 1, 2].map(|k| pick(&shares[k]))) } else { DVec3::splat(flat / 3.0) }
         };
+        let (at, dx, dy) = (column(|s| s.z, most), column(|s| s.x, 0.0), column(|s| s.y, 0.0));
         Surface {
             triangle,
             object: scene.objects[triangle as usize],
             facing,
             side: side(scene, triangle, facing),
             origin,
-            at: column(|s| s.z, most),
-            dx: column(|s| s.x, 0.0),
-            dy: column(|s| s.y, 0.0),
+            at,
+            dx,
+            dy,
+            sum: [at.element_sum(), dx.element_sum(), dy.element_sum()],
             least,
             most,
         }
@@ -151,8 +154,8 @@ impl Surface {
 
     /// 1/z at a pixel and its change with one column, before it is held to the range.
     pub fn reciprocal(&self, x: i32, y: i32) -> (f64, f64) {
-        let (shares, step) = self.shares(x, y);
-        (shares.element_sum(), step.element_sum())
+        let [at, dx, dy] = self.sum;
+        (at + dx * (f64::from(x) - self.origin[0]) + dy * (f64::from(y) - self.origin[1]), dx)
     }
 
     /// Least and most 1/z of the triangle. A sample may lie outside by the snapping: it is held to this range.
@@ -239,34 +242,79 @@ fn faces_of(corners: [DVec3; 3], view: &View, mut take: impl FnMut(Face)) {
 pub fn visible(scene: &Scene<'_>, view: &View) -> Result<(Vec<Face>, Vec<Surface>), KernelError> {
     const CHUNK: usize = 4096;
     let points = view.project(scene.vertices)?;
-    let chunks: Vec<(Vec<Face>, Vec<Surface>)> = scene
-        .triangles
-        .par_chunks(CHUNK)
-        .enumerate()
-        .map(|(chunk, triangles)| {
-            let (mut faces, mut surfaces) = (Vec::new(), Vec::new());
-            for (index, triangle) in triangles.iter().enumerate() {
-                let corners = triangle.map(|vertex| points[vertex as usize]);
-                let before = faces.len();
-                faces_of(corners, view, |face| faces.push(Face { surface: surfaces.len() as u32, ..face }));
-                if faces.len() > before {
-                    surfaces.push(Surface::new(scene, (chunk * CHUNK + index) as u32, corners, view));
-                }
+    let corners = |triangle: u32| scene.corners(triangle, &points);
+    let pieces: Vec<Vec<Face>> = (0..scene.triangles.len())
+        .into_par_iter()
+        .step_by(CHUNK)
+        .map(|first| {
+            let mut faces = Vec::new();
+            for triangle in first..(first + CHUNK).min(scene.triangles.len()) {
+                let surface = triangle as u32;
+                faces_of(corners(surface), view, |face| faces.push(Face { surface, ..face }));
             }
-            (faces, surfaces)
+            faces
         })
         .collect();
-    let (mut faces, mut surfaces) = (Vec::new(), Vec::new());
-    for (some_faces, some_surfaces) in chunks {
-        let offset = surfaces.len() as u32;
-        faces.extend(some_faces.into_iter().map(|face| Face { surface: face.surface + offset, ..face }));
-        surfaces.extend(some_surfaces);
+    let mut faces = pieces.concat();
+    let mut triangles = Vec::new();
+    for face in &mut faces {
+        if triangles.last() != Some(&face.surface) {
+            triangles.push(face.surface);
+        }
+        face.surface = triangles.len() as u32 - 1;
     }
+    let surfaces = triangles.into_par_iter().map(|t| Surface::new(scene, t, corners(t), view)).collect();
     Ok((faces, surfaces))
 }
 
-/// The triangles' own unit normals on the side that the camera sees, for creases.
-pub fn seen_normals(scene: &Scene<'_>, surfaces: &[Surface]) -> Vec<Vec3> {
-    let normal = |s: &Surface| scene.face_normal(s.triangle).normalize_or_zero().as_vec3() * s.facing;
-    surfaces.par_iter().map(normal).collect()
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const VIEW: View = View {
+        matrix: [[8.0, 0.0, 4.0, 0.0], [0.0, 8.0, 4.0, 0.0], [0.0, 0.0, 1.0, 0.0]],
+        near: 0.5,
+        width: 8,
+        height: 8,
+        margin: 0,
+    };
+
+    fn surface(vertices: [DVec3; 3]) -> Surface {
+        let scene =
+            Scene { vertices: &vertices, triangles: &[[0, 1, 2]], colors: &[[1.0; 4]; 3], normals: &[], objects: &[1] };
+        let corners = VIEW.project(&vertices).unwrap_or_default();
+        Surface::new(&scene, 0, [corners[0], corners[1], corners[2]], &VIEW)
+    }
+
+    #[test]
+    fn depth_is_where_the_ray_meets_the_plane() {
+        // The plane z = 2 + x: a ray (u, v, 1) meets it at z = 2 / (1 - u).
+        let slanted = surface([DVec3::new(-1., -1., 1.), DVec3::new(1., -1., 3.), DVec3::new(0., 1., 2.)]);
+        for (x, y) in [(2, 2), (4, 4), (5, 3)] {
+            let u = (f64::from(x) - 4.0) / 8.0;
+            assert!((slanted.depth(x, y) - 2.0 / (1.0 - u)).abs() < 1e-12);
+            let (shares, _) = slanted.shares(x, y);
+            assert!((shares.element_sum().recip() - slanted.depth(x, y)).abs() < 1e-12);
+        }
+        assert_eq!((slanted.depth(-999, 4), slanted.depth(11, 4)), (1.0, 3.0));
+    }
+
+    #[test]
+    fn a_triangle_seen_from_its_edge_has_its_nearest_depth() {
+        let edge_on = surface([DVec3::new(0., 0., 1.), DVec3::new(0., 0., 2.), DVec3::new(0., 1., 2.)]);
+        assert_eq!(edge_on.depth(3, 5), 1.0);
+        assert!(edge_on.shares(3, 5).0.is_finite());
+    }
+
+    #[test]
+    fn facing_follows_the_winding() {
+        let corners = [DVec3::new(0., 0., 2.), DVec3::new(1., 0., 2.), DVec3::new(0., 1., 2.)];
+        assert_eq!(surface(corners).facing, -1.0);
+        assert_eq!(surface([corners[1], corners[0], corners[2]]).facing, 1.0);
+    }
+
+    #[test]
+    fn the_first_sample_is_the_ceiling() {
+        assert_eq!([-257, -256, -1, 0, 1, 256].map(first_sample), [-1, -1, 0, 0, 1, 1]);
+    }
 }

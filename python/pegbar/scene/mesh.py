@@ -64,7 +64,8 @@ class Mesh:
 
 def smooth_normals(vertices: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDArray[np.float64]:
     """Return the unit normals (n, 3) at ``vertices`` (n, 3): the area-weighted mean over ``triangles`` (T, 3)."""
-    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    scaled = vertices / max(np.abs(vertices).max(initial=0), np.finfo(float).tiny)
+    a, b, c = (scaled[triangles[:, k]] for k in range(3))
     faces = np.repeat(np.cross(b - a, c - a), 3, axis=0)
     corners = triangles.ravel()
     sums = [np.bincount(corners, faces[:, axis], len(vertices)) for axis in range(3)]
@@ -72,8 +73,9 @@ def smooth_normals(vertices: NDArray[np.float64], triangles: NDArray[np.int64]) 
 
 
 def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
-    unit: NDArray[np.float64] = vectors / np.where(lengths > 0, lengths, 1)
+    largest = np.abs(vectors).max(axis=1, keepdims=True, initial=0)
+    scaled = vectors / np.where(largest > 0, largest, 1)
+    unit: NDArray[np.float64] = scaled / np.maximum(np.linalg.norm(scaled, axis=1, keepdims=True), 1)
     return unit
 
 
