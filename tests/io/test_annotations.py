@@ -153,13 +153,14 @@ def drawings(draw):
         name = st.text("abc ä#%", min_size=1, max_size=5).map(lambda word: Path("/pictures") / f"x{word}.png")
         return draw(st.just(()) | st.lists(name, min_size=frames, max_size=frames).map(tuple))
 
+    size = draw(st.tuples(st.integers(1, 9999), st.integers(1, 9999)))
     matrix = np.array([[100, 0, 47.5, 0], [0, 100, 63.5, 0], [0, 0, 1, 0.0]])
     shifts = draw(st.lists(finite, min_size=frames, max_size=frames) | st.just([]) | finite.map(lambda x: [x] * frames))
     return Drawing(
         names=markers,
         markers=points,
         visible=visible,
-        image_size=draw(st.tuples(st.integers(1, 9999), st.integers(1, 9999))),
+        image_size=size,
         frame_rate=draw(st.none() | st.floats(1, 120)),
         images=files(),
         segmentations=files(),
@@ -168,7 +169,7 @@ def drawings(draw):
         boxes=array(len(limbs), 4, 2),
         extents=array(len(limbs), 4),
         depths=array(count),
-        cameras=tuple(PerspectiveCamera(matrix + np.eye(3, 4, 3) * shift, (96, 128)) for shift in shifts),
+        cameras=tuple(PerspectiveCamera(matrix + np.eye(3, 4, 3) * shift, size) for shift in shifts),
         loops=draw(st.booleans()),
         holds=draw(st.just(()) | st.lists(st.integers(2, 9), min_size=frames, max_size=frames).map(tuple)),
         notes=draw(st.dictionaries(st.sampled_from(["source", "licence", "facing"]), st.text())),
@@ -186,6 +187,7 @@ def test_what_is_written_is_read(tmp_path_factory, drawing):
 
 
 MATRIX = SMALL["camera"]["matrix"]
+CAMERA = PerspectiveCamera(MATRIX, (96, 128))
 
 
 @pytest.mark.parametrize(
@@ -276,13 +278,20 @@ def test_a_real_file_cut_anywhere_is_refused(test_data, tmp_path):
         ({"markers": np.full((2, 1, 2), np.nan)}, "a visible marker needs a place"),
         ({"depths": np.full((2, 1), np.nan)}, "depths: want finite"),
         ({"boxes": np.zeros((2, 1, 4, 2))}, "boxes: want shape"),
+        ({"names": ("",)}, r"markers\[0\]: want a text"),
+        ({"limbs": (Limb("arm", "head", "hand"),)}, r"limbs\[0\].to: no marker is called"),
+        ({"limbs": (Limb("arm", "head", "head", (0, 0, 0)),)}, r"limbs\[0\].color: black"),
+        ({"notes": {"frames": "many"}}, "notes: 'frames' is a key of the format"),
+        ({"notes": {"version": 3}}, "version: unknown key"),
+        ({"frame_rate": 0.0}, "fps: want a number"),
+        ({"cameras": (CAMERA, CAMERA)}, "cameras: want the drawing's image size"),
         ({"images": (Path("a"),)}, "images: want none or one a frame"),
         ({"markers": np.zeros((0, 1, 2)), "visible": np.zeros((0, 1), bool)}, "at least one frame"),
     ],
 )
 def test_a_drawing_that_does_not_fit_is_not_written(changes, problem, tmp_path):
-    plain = {"markers": np.zeros((2, 1, 2)), "visible": np.ones((2, 1), bool)}
-    drawing = Drawing(names=("head",), image_size=(9, 9), **(plain | changes))
+    plain = {"names": ("head",), "markers": np.zeros((2, 1, 2)), "visible": np.ones((2, 1), bool)}
+    drawing = Drawing(image_size=(9, 9), **(plain | changes))
     with pytest.raises(ValueError, match=problem):
         write_annotations(tmp_path / "a.json", drawing)
     assert list(tmp_path.iterdir()) == []

@@ -110,7 +110,34 @@ def test_an_absurd_size_is_refused_before_memory_is_reserved(kind, tmp_path, mon
         read_image(file)
 
 
+def test_a_tiled_tiff_is_checked_as_well(tmp_path):
+    # One tile: the tags for strips give way to those for tiles.
+    data = bytearray(pictures.tiff(16, 16, 1, bytes(range(256))))
+    for old, new in ((273, 324), (279, 325), (278, 323), (259, 259)):
+        place = data.index(struct.pack("<HH", old, 3 if old == 259 else 4), 8)
+        data[place : place + 2] = struct.pack("<H", new)
+    file = tmp_path / "tile.tif"
+    file.write_bytes(data)
+    structure.check_tiff(file, bytes(data))
+    with pytest.raises(FormatError, match=r"tile\.tif.*cut short"):
+        structure.check_tiff(file, bytes(data[:-1]))
+
+
+def test_every_kind_of_jpeg_frame_is_found(tmp_path):
+    image = np.random.default_rng(0).integers(0, 255, (40, 30, 3), dtype=np.uint8)
+    data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_PROGRESSIVE, 1, cv2.IMWRITE_JPEG_RST_INTERVAL, 1])[1].tobytes()
+    assert b"\xff\xc2" in data
+    file = tmp_path / "progressive.jpg"
+    # Fill bytes may stand before a marker, and anything after the end.
+    file.write_bytes(data[:2] + b"\xff\xff" + data[2:] + b"a camera's own notes")
+    assert read_image(file).shape == (40, 30, 3)
+    file.write_bytes(data[:2] + b"\0" + data[2:])
+    with pytest.raises(FormatError, match="at byte 2|not a PNG"):
+        read_image(file)
+
+
 def test_the_size_limit_counts_pixels():
+    assert structure.MAX_PIXELS == 16384 * 16384
     structure.check_size("a", structure.MAX_PIXELS, 1)
     for size in ((structure.MAX_PIXELS + 1, 1), (0, 5), (5, 0), (-1, -1)):
         with pytest.raises(FormatError, match=f"{size[0]}x{size[1]}"):

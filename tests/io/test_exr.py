@@ -211,6 +211,15 @@ def test_random_damage_is_an_error_or_a_picture(file, capfd):
     capfd.readouterr()
 
 
+def test_a_header_longer_than_usual_is_read_whole(file):
+    save(file, {**COLOURS, "Z": RAMP}, comment="x" * (1 << 19))
+    assert np.array_equal(read_passes(file).depth, RAMP)
+    data = file.read_bytes()
+    file.write_bytes(data[: 1 << 18])
+    with pytest.raises(FormatError, match="cut short"):
+        read_passes(file)
+
+
 def test_an_absurd_size_is_refused_before_memory_is_reserved(file, monkeypatch):
     save(file, {"Z": RAMP})
     data = file.read_bytes()

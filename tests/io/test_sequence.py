@@ -109,6 +109,16 @@ def test_a_folder_of_several_sequences_lists_them(folder, test_data):
     assert len(FrameSequence.parse(test_data / "annotated" / "morevna_side_walk" / "frames").numbers) == 48
 
 
+def test_a_long_list_of_sequences_is_cut(folder):
+    touch(folder, *(f"{letter}.1.png" for letter in "abcdefghij"))
+    with pytest.raises(FormatError, match=r"name one: a\.#\.png 1, .*, h\.#\.png 1 and 2 more$"):
+        FrameSequence.parse(folder)
+    (folder / "i.1.png").unlink()
+    (folder / "j.1.png").unlink()
+    with pytest.raises(FormatError, match=r"h\.#\.png 1$"):
+        FrameSequence.parse(folder)
+
+
 def test_a_folder_without_pictures_and_a_name_without_numbers(folder):
     touch(folder, "a.0001.txt", "cover.png")
     with pytest.raises(FormatError, match="no numbered pictures"):

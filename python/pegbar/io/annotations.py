@@ -20,7 +20,8 @@ from pegbar.scene.drawing import Color, Drawing, Limb
 _Path = str | os.PathLike[str]
 #: The longest side a picture may have.
 MAX_SIDE = 1 << 20
-_TOP = {
+#: The keys of the file itself; true: needed. Others are notes.
+KEYS = {
     "markers": True,
     "image_size": True,
     "fps": False,
@@ -75,7 +76,11 @@ def read_annotations(path: _Path) -> Drawing:
     >>> read_annotations(file).markers
     array([[[4., 5.]]])
     """
-    content = _read_text(path)
+    return parse(path, _read_text(path))
+
+
+def parse(path: _Path, content: str) -> Drawing:
+    """As ``read_annotations``, for a file whose text was read already."""
     if not content.lstrip().startswith(("{", "[")):
         return animated_drawings.parse(path, content)
     value = places.parse_json(path, content)
@@ -101,8 +106,8 @@ def _read_text(path: _Path) -> str:
 def _drawing(folder: Path, value: Any) -> Drawing:
     if not isinstance(value, dict):
         raise Misplaced((), f"want an object, got {places.brief(value)}")
-    notes = {key: note for key, note in value.items() if key not in _TOP and _is_note(note)}
-    top = member({key: entry for key, entry in value.items() if key not in notes}, (), _TOP)
+    notes = {key: note for key, note in value.items() if key not in KEYS and _is_note(note)}
+    top = member({key: entry for key, entry in value.items() if key not in notes}, (), KEYS)
     names = _names(top["markers"])
     width, height = (
         whole(side, ("image_size", i), low=1, high=MAX_SIDE) for i, side in enumerate(_pair(top["image_size"]))

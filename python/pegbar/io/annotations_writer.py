@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pegbar.errors import FormatError
 from pegbar.io import atomic
+from pegbar.io.annotations import KEYS, parse
 from pegbar.scene.drawing import Drawing
 
 _Path = str | os.PathLike[str]
@@ -45,7 +47,10 @@ def write_annotations(path: _Path, drawing: Drawing) -> None:
         top["limbs"] = [
             {"name": limb.name, "from": limb.start, "to": limb.end, "color": limb.color} for limb in drawing.limbs
         ]
-    top |= dict(drawing.notes)
+    for key, note in drawing.notes.items():
+        if key in KEYS:
+            raise ValueError(f"drawing: notes: {key!r} is a key of the format")
+        top[key] = note
     frames = [_frame(drawing, index, folder) for index in range(count)]
     for key in ("camera", "depths"):
         values = [frame[key] for frame in frames if key in frame]
@@ -53,7 +58,12 @@ def write_annotations(path: _Path, drawing: Drawing) -> None:
             top[key] = values[0]
             for frame in frames:
                 del frame[key]
-    atomic.write_bytes(path, _layout(top, frames).encode())
+    layout = _layout(top, frames)
+    try:
+        parse(path, layout)
+    except FormatError as error:
+        raise ValueError(f"drawing: {error.problem}") from None
+    atomic.write_bytes(path, layout.encode())
 
 
 def _check(drawing: Drawing) -> None:
@@ -74,8 +84,8 @@ def _check(drawing: Drawing) -> None:
             raise ValueError(f"drawing: {name}: want finite numbers")
         if array is not None and np.isinf(array).any():
             raise ValueError(f"drawing: {name}: JSON has no infinity")
-    if (np.isnan(drawing.markers).any(axis=2) & drawing.visible).any():
-        raise ValueError("drawing: markers: a visible marker needs a place")
+    if any(camera.image_size != drawing.image_size for camera in drawing.cameras):
+        raise ValueError("drawing: cameras: want the drawing's image size")
     for name in ("images", "segmentations", "masks", "cameras", "holds"):
         if len(getattr(drawing, name)) not in (0, count):
             raise ValueError(f"drawing: {name}: want none or one a frame ({count}), got {len(getattr(drawing, name))}")

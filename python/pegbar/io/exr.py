@@ -113,7 +113,7 @@ def read_passes(
     beauty = depth = None
     if "beauty" in want:
         names = exr_channels.find_beauty(path, found, layer)
-        beauty = _join(path, [(found[name][0], _to_float(found[name][1])) for name in names])
+        beauty = _join(path, [found[name] for name in names])
     if "depth" in want:
         part, plane = found[exr_channels.find_depth(path, found, layer)]
         depth = _place(_clean_depth(path, _to_float(plane), part), part, np.inf)
@@ -162,30 +162,42 @@ def _split(channels: Mapping[str, ArrayLike]) -> dict[str, NDArray[Any]]:
     planes: dict[str, NDArray[Any]] = {}
     for name, value in channels.items():
         array = np.asarray(value)
-        if array.ndim == 3 and array.shape[2] in (3, 4):
+        if array.dtype.kind not in "fiu":
+            raise ValueError(f"channels: {name!r}: want real numbers, got dtype {array.dtype}")
+        if array.ndim == 3 and array.shape[2] in (3, 4) and array.size:
             prefix = f"{name}." if name else ""
-            for index, letter in enumerate("RGBA"[: array.shape[2]]):
-                planes[prefix + letter] = array[..., index]
+            letters = [prefix + letter for letter in "RGBA"[: array.shape[2]]]
+            planes |= zip(letters, _layer_planes(array), strict=True)
         elif array.ndim == 2 and name:
-            planes[name] = array
+            planes[name] = _stored(array, half=name.rpartition(".")[2] in ("R", "G", "B", "A", "Y"))
         else:
             raise ValueError(f"channels: {name!r}: want shape (H, W) or (H, W, 3|4), got {array.shape}")
     if not planes or len({plane.shape for plane in planes.values()}) > 1 or not all(p.size for p in planes.values()):
         raise ValueError(f"channels: want one size for all, got { {n: p.shape for n, p in planes.items()} }")
-    return {name: _stored(name, plane) for name, plane in planes.items()}
+    return planes
 
 
-def _stored(name: str, plane: NDArray[Any]) -> NDArray[Any]:
-    if plane.dtype == np.uint32 or plane.dtype == np.float16:
-        return np.ascontiguousarray(plane)
-    if plane.dtype.kind not in "fiu":
-        raise ValueError(f"channels: {name!r}: want real numbers, got dtype {plane.dtype}")
-    plane = np.ascontiguousarray(plane, np.float32)
-    if name.rpartition(".")[2] not in ("R", "G", "B", "A", "Y") or np.abs(plane).max() > _HALF_MAX:
-        return plane
+def _layer_planes(array: NDArray[Any]) -> list[NDArray[Any]]:
+    """The planes of an (H, W, C) picture; converted as a whole, since a plane of it is not contiguous."""
     import cv2
 
-    return np.asarray(cv2.convertFp16(plane)).view(np.float16)
+    if array.dtype == np.uint32:
+        return [np.ascontiguousarray(array[..., index]) for index in range(array.shape[2])]
+    stored = _stored(array, half=True)
+    planes = cv2.split(stored.view(np.int16) if stored.dtype == np.float16 else stored)
+    return [np.asarray(plane).view(stored.dtype) for plane in planes]
+
+
+def _stored(array: NDArray[Any], *, half: bool) -> NDArray[Any]:
+    """As uint32 or half if it is that, as half if it shall be and fits, else as float."""
+    if array.dtype == np.uint32 or array.dtype == np.float16:
+        return np.ascontiguousarray(array)
+    array = np.ascontiguousarray(array, np.float32)
+    if not half or not array.size or max(array.max(), -array.min()) > _HALF_MAX:
+        return array
+    import cv2
+
+    return np.asarray(cv2.convertFp16(array)).view(np.float16).reshape(array.shape)
 
 
 def _read_parts(path: _Path) -> list[tuple[exr_header.Part, dict[str, NDArray[Any]]]]:
@@ -222,7 +234,7 @@ def _to_float(plane: NDArray[Any]) -> Floats:
     return np.asarray(cv2.convertFp16(np.ascontiguousarray(plane).view(np.int16)), np.float32).reshape(plane.shape)
 
 
-def _join(path: _Path, planes: list[tuple[exr_header.Part, Floats]]) -> Floats:
+def _join(path: _Path, planes: list[tuple[exr_header.Part, NDArray[Any]]]) -> Floats:
     """Grey, grey and alpha, RGB or RGBA planes as one (H, W, 4) picture, opaque where they say nothing of alpha."""
     import cv2
 
@@ -234,18 +246,20 @@ def _join(path: _Path, planes: list[tuple[exr_header.Part, Floats]]) -> Floats:
         raise FormatError(path, "the EXR's beauty channels differ in size")
     if len(placed) == 2:
         placed = [placed[0], placed[0], *placed]
-    return np.asarray(cv2.merge(placed), np.float32)
+    # Halves are joined as they are: half the bytes to move.
+    if all(plane.dtype == np.float16 for plane in placed):
+        return _to_float(np.asarray(cv2.merge([plane.view(np.int16) for plane in placed])).view(np.float16))
+    return np.asarray(cv2.merge([_to_float(plane) for plane in placed]), np.float32)
 
 
 def _clean_depth(path: _Path, depth: Floats, part: exr_header.Part) -> Floats:
-    least = depth.min()
-    if not least > -np.inf:
+    if not depth.min() > -np.inf:
         row, column = np.argwhere(~(depth > -np.inf))[0].tolist()
         value = depth[row, column]
         row, column = row + part.data_window[1] - part.display_window[1], column + part.data_window[0]
         raise FormatError(path, f"depth is {value} at row {row}, column {column - part.display_window[0]}")
     background = depth >= BACKGROUND_DEPTH
-    return np.where(background, np.float32(np.inf), depth) if background.any() else depth
+    return np.where(background, np.float32(np.inf), depth)
 
 
 def _place(plane: NDArray[Any], part: exr_header.Part, fill: float) -> NDArray[Any]:

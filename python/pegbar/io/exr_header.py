@@ -8,12 +8,13 @@ https://openexr.com/en/latest/OpenEXRFileLayout.html
 from __future__ import annotations
 
 import math
-import mmap
 import os
 import struct
 from dataclasses import dataclass
+from io import FileIO
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pegbar.errors import FormatError
 from pegbar.io.structure import check_size
@@ -22,7 +23,13 @@ _Path = str | os.PathLike[str]
 _TILED, _DEEP, _MULTIPART = 0x200, 0x800, 0x1000
 # Rows of one chunk by compression: none, rle, zips, zip, piz, pxr24, b44, b44a, dwaa, dwab, htj2k256, htj2k32.
 _ROWS = (1, 1, 1, 16, 32, 16, 32, 32, 32, 256, 256, 32)
+# More than any usual header and its table of chunks; what is longer is read again as a whole.
+_HEAD = 1 << 18
 _TYPES = ("uint32", "float16", "float32")
+
+
+class _Short(Exception):
+    """The bytes at hand end before the header does."""
 
 
 @dataclass(frozen=True)
@@ -43,17 +50,21 @@ class Part:
 
 def read_header(path: _Path) -> list[Part]:
     """Return the parts of an EXR file; FormatError when it is none, cut short, deep, or absurdly large."""
-    with open(path, "rb") as file:
-        if os.fstat(file.fileno()).st_size < 8:
-            raise FormatError(path, "the EXR is empty or cut short", byte=0)
-        with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+    # Plain reads: a renderer that replaces a file which is mapped into memory would kill the process.
+    with open(path, "rb", buffering=0) as file:
+        size = os.fstat(file.fileno()).st_size
+        for head in (_HEAD, size):
+            file.seek(0)
+            data = file.read(head)
             try:
-                return _read_parts(path, data)
-            except (struct.error, IndexError):
-                raise FormatError(path, "the EXR is cut short", byte=len(data)) from None
+                return _read_parts(path, data, file, size)
+            except (struct.error, IndexError, _Short):
+                if len(data) >= size:
+                    break
+        raise FormatError(path, "the EXR is empty or cut short", byte=size)
 
 
-def _read_parts(path: _Path, data: mmap.mmap) -> list[Part]:
+def _read_parts(path: _Path, data: bytes, file: FileIO, size: int) -> list[Part]:
     magic, version = struct.unpack_from("<II", data, 0)
     if magic != 20000630:
         raise FormatError(path, "not an EXR file", byte=0)
@@ -73,12 +84,15 @@ def _read_parts(path: _Path, data: mmap.mmap) -> list[Part]:
     for attributes, part in zip(headers, parts, strict=True):
         tiled = bool(version & _TILED) or attributes.get("type") == b"tiledimage"
         count = _chunk_count(path, attributes, part, tiled)
-        _check_chunks(path, data, place, count, tiled, bool(version & _MULTIPART))
+        if place + 8 * count > len(data):
+            raise _Short
+        starts = np.frombuffer(data, "<u8", count, place)
+        _check_chunks(path, file, size, starts, (4 if version & _MULTIPART else 0) + (16 if tiled else 4))
         place += 8 * count
     return parts
 
 
-def _read_attributes(path: _Path, data: mmap.mmap, place: int) -> tuple[dict[str, bytes], int]:
+def _read_attributes(path: _Path, data: bytes, place: int) -> tuple[dict[str, bytes], int]:
     attributes: dict[str, bytes] = {}
     while data[place] != 0:
         name, place = _text(path, data, place)
@@ -86,16 +100,18 @@ def _read_attributes(path: _Path, data: mmap.mmap, place: int) -> tuple[dict[str
         (size,) = struct.unpack_from("<I", data, place)
         place += 4
         if place + size > len(data):
-            raise FormatError(path, f"the EXR is cut short or damaged in its attribute {name!r}", byte=place)
+            raise _Short
         attributes[name] = data[place : place + size]
         place += size
     return attributes, place + 1
 
 
-def _text(path: _Path, data: mmap.mmap, place: int) -> tuple[str, int]:
+def _text(path: _Path, data: bytes, place: int) -> tuple[str, int]:
     end = data.find(b"\0", place, place + 256)
+    if end < 0 and place + 256 > len(data):
+        raise _Short
     if end < 0:
-        raise FormatError(path, "the EXR's header is cut short or damaged", byte=place)
+        raise FormatError(path, "the EXR's header is damaged: a name without end", byte=place)
     try:
         return data[place:end].decode("utf-8"), end + 1
     except UnicodeDecodeError:
@@ -155,16 +171,13 @@ def _tile_count(attributes: dict[str, bytes], width: int, height: int) -> int:
     return math.ceil(width / max(sides[0], 1)) * math.ceil(height / max(sides[1], 1))
 
 
-def _check_chunks(path: _Path, data: mmap.mmap, place: int, count: int, tiled: bool, multipart: bool) -> None:
-    if place + 8 * count > len(data):
-        raise FormatError(path, "the EXR is cut short", byte=len(data))
-    starts = np.frombuffer(data[place : place + 8 * count], "<u8")
-    lead = (4 if multipart else 0) + (16 if tiled else 4)
-    last = len(data) - lead - 4
-    wrong = np.flatnonzero((starts == 0) | (starts > max(last, 0)))
+def _check_chunks(path: _Path, file: FileIO, size: int, starts: NDArray[np.uint64], lead: int) -> None:
+    """Every chunk must be there as a whole; ``lead`` bytes stand before its length."""
+    wrong = np.flatnonzero((starts == 0) | (starts > max(size - lead - 4, 0)))
     if len(wrong):
-        raise FormatError(path, f"the EXR is cut short: {len(wrong)} of its {count} chunks are missing")
+        raise FormatError(path, f"the EXR is cut short: {len(wrong)} of its {len(starts)} chunks are missing")
     for start in starts.tolist():
-        (size,) = struct.unpack_from("<i", data, start + lead)
-        if size < 0 or start + lead + 4 + size > len(data):
+        file.seek(start + lead)
+        length = int.from_bytes(file.read(4), "little", signed=True)
+        if length < 0 or start + lead + 4 + length > size:
             raise FormatError(path, "the EXR is cut short or damaged: a chunk ends after the file", byte=start)

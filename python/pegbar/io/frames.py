@@ -69,11 +69,11 @@ def read_image(path: _Path) -> Image:
     >>> read_image(file).shape
     (2, 3, 4)
     """
-    data = Path(path).read_bytes()
-    if data.startswith(b"\x76\x2f\x31\x01"):
-        beauty = exr.read_passes(path, want=("beauty",)).beauty
-        assert beauty is not None
-        return beauty
+    with open(path, "rb") as file:
+        if file.read(4) == b"\x76\x2f\x31\x01":
+            return exr.read_passes(path, want=("beauty",)).beauty  # type: ignore[return-value]
+        file.seek(0)
+        data = file.read()
     if data.startswith(b"\x89PNG\r\n\x1a\n"):
         return _read_png(path, data)
     if data.startswith(b"\xff\xd8\xff"):
