@@ -23,17 +23,20 @@ impl Window {
         Window { origin: a, along, length: along.length(), half_width }
     }
 
-    /// The pixel's distance from the limb, when it lies inside the window (borders belong to it).
-    fn distance(&self, pixel: DVec2) -> Option<f64> {
+    /// The pixel's squared distance from the limb, when it lies inside the window (borders belong to it). Without a
+    /// root, so that places on whole pixels compare exactly.
+    fn squared_distance(&self, pixel: DVec2) -> Option<f64> {
         let offset = pixel - self.origin;
-        if self.length == 0.0 {
-            let distance = offset.length();
-            return (distance <= self.half_width).then_some(distance);
-        }
-        let along = offset.dot(self.along);
-        let distance = self.along.perp_dot(offset).abs() / self.length;
-        let inside = along >= 0.0 && along <= self.along.length_squared() && distance <= self.half_width;
-        inside.then_some(distance)
+        let squared = if self.length == 0.0 {
+            offset.length_squared()
+        } else {
+            let (along, whole) = (offset.dot(self.along), self.along.length_squared());
+            if along < 0.0 || along > whole {
+                return None;
+            }
+            self.along.perp_dot(offset).powi(2) / whole
+        };
+        (squared <= self.half_width * self.half_width).then_some(squared)
     }
 
     /// The rows that the window may touch.
@@ -46,7 +49,7 @@ impl Window {
     }
 
     /// The columns of a row that may lie inside: the strip between the ends cut with the strip beside the axis.
-    /// One pixel is added on both sides, so that rounding never loses one; `distance` decides.
+    /// One pixel is added on both sides, so that rounding never loses one; `squared_distance` decides.
     fn columns(&self, row: usize, width: usize) -> Range<usize> {
         let y = row as f64 - self.origin.y;
         let (mut first, mut last) = (f64::NEG_INFINITY, f64::INFINITY);
@@ -107,7 +110,7 @@ fn segment_row(row: usize, gray: &[u8], windows: &[Window], threshold: u16, near
         }
         for column in window.columns(row, gray.len()) {
             if u16::from(gray[column]) < threshold
-                && let Some(distance) = window.distance(DVec2::new(column as f64, row as f64))
+                && let Some(distance) = window.squared_distance(DVec2::new(column as f64, row as f64))
                 && distance < nearest[column]
             {
                 (nearest[column], out[column]) = (distance, label);
@@ -151,7 +154,7 @@ mod tests {
         let window = Window::new(ends, 3.7);
         let out = labels(&[ends], 3.7, 26, 26);
         for (i, label) in out.iter().enumerate() {
-            let inside = window.distance(DVec2::new((i % 26) as f64, (i / 26) as f64)).is_some();
+            let inside = window.squared_distance(DVec2::new((i % 26) as f64, (i / 26) as f64)).is_some();
             assert_eq!(*label == 1, inside, "pixel {i}");
         }
     }
