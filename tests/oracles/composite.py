@@ -74,3 +74,15 @@ def straight_bytes(premultiplied):
         premultiplied[..., :3], coverage, out=np.zeros_like(premultiplied[..., :3]), where=coverage > 0
     )
     return np.rint(255 * np.clip(np.concatenate([straight, coverage], axis=-1), 0, 1)).astype(np.uint8)
+
+
+def matte(alpha, drawing_depth, rendered_alpha, rendered_depth):
+    """Mean over samples of alpha where the drawing is in front; what shows through a given coverage counts too."""
+    scale = rendered_depth.shape[0] // alpha.shape[0]
+    a, z = (
+        np.kron(np.asarray(values, float), np.ones((scale, scale)))
+        for values in (alpha, np.minimum(drawing_depth, 1e9))
+    )
+    front = (z >= 1e9) | (z < rendered_depth)
+    through = 0 if rendered_alpha is None else 1 - np.clip(rendered_alpha, 0, 1)
+    return average(np.where(front, a, a * through)[..., None], scale)[..., 0]
