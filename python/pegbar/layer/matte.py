@@ -59,11 +59,7 @@ def matte(image: ArrayLike, mode: Mode | Literal["auto"] = "auto", *, labels: Ar
         - "ink": equations 14 and 15 of Jain et al. 2010, alpha = darkness, colour as drawn. Light colours become glass.
         - "unmix": alpha = 1 - min(R, G, B), and the colour that over white gives the drawing back.
         - "fill": alpha 1 inside the labelled limbs, "unmix" outside. The limbs' border pixels, part paint and part
-<<<<<<< HEAD
-          paper, get the alpha with which the paint farther in explains them.
-=======
           paper, get the alpha with which the paint farther in explains them; hard borders stay opaque.
->>>>>>> labels
         - "alpha": the picture's own alpha and colour.
         - "auto": "alpha" for a picture whose alpha channel is not all 255, else "fill" if there are labels, else
           "unmix".
