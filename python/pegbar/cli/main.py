@@ -16,6 +16,7 @@ app = App(
     help="Hand-drawn animation and motion capture: depth for drawings, and depth compositing with 3D renders.",
     version=lambda: version("pegbar"),
     help_format="plaintext",
+    suppress_keyboard_interrupt=False,
 )
 # The commands' modules are imported when they run, so that help comes quickly; what it says stands here.
 COMMANDS = {

@@ -34,6 +34,16 @@ def write_annotations(path: _Path, drawing: Drawing) -> None:
         For a drawing whose arrays do not fit its names and limbs, or hold what JSON cannot (inf).
     OSError
         When the file cannot be written; it names ``path``.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from pegbar import read_annotations
+    >>> file = pathlib.Path(tempfile.mkdtemp()) / "dot.json"
+    >>> dot = Drawing(("head",), np.array([[[4.0, 5.0]]]), np.array([[True]]), (9, 9))
+    >>> write_annotations(file, dot)
+    >>> read_annotations(file).markers.tolist()
+    [[[4.0, 5.0]]]
     """
     _check(drawing)
     folder = Path(path).absolute().parent

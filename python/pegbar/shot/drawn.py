@@ -17,6 +17,10 @@ from pegbar.layer.segmentation import grow_labels, palette_labels, segment_stick
 from pegbar.shot.plan import Shot
 
 
+# Coverage below which ink is taken for the grain of the paper: 25 levels of 255, where scans and JPEG stay within 15.
+FAINT = 0.1
+
+
 @dataclass(frozen=True, eq=False)
 class Drawn:
     """A drawn frame: ``color`` (H, W, 3) uint8 straight, ``alpha`` and ``depth`` (H, W) float32, and what to note."""
@@ -59,6 +63,10 @@ def read_drawn(shot: Shot, frame: int) -> Drawn:
             f"frame {frame}: no depth: the shot needs drawing.labels (limb colours), drawing.half_width (a stick "
             "figure) or drawing.depth"
         )
+    if layer.mode == "fill":
+        # Lines belong to the limbs that they bound before those are made opaque; faint ink is paper.
+        labels = grow_labels(labels, layer.alpha > FAINT, reach=settings.reach)
+        layer = matte(picture, "fill", labels=labels)
     grown = grow_labels(labels, layer.alpha > 0, reach=settings.reach)
     ends, end_depths = limb_ends(shot, frame, grown)
     return Drawn(
