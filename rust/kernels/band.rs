@@ -43,7 +43,7 @@ impl Edge {
 }
 
 /// Samples that are compared at a time; rows begin and end at whole groups.
-const LANES: usize = 4;
+pub const LANES: usize = 4;
 
 /// Rows of a picture with its margin: the nearest surface of every sample and its 1/z.
 pub struct Band {
