@@ -32,7 +32,7 @@ impl Axis {
         let along = b - a;
         let squared = along.length_squared();
         let reciprocal = interpolation == Interpolation::Perspective;
-        // A limb seen end on takes its nearer end (PAPERS.md): without a slope the depth stays there.
+        // A limb seen end on takes its nearer end (docs/papers.md): without a slope the depth stays there.
         let (za, zb) = if squared > 0.0 { (za, zb) } else { (za.min(zb), za.min(zb)) };
         let (from, to) = if reciprocal { (za.recip(), zb.recip()) } else { (za, zb) };
         let slope = if squared > 0.0 { along * ((to - from) / squared) } else { DVec2::ZERO };
@@ -158,5 +158,13 @@ mod tests {
         let mut out = [0.0; 4];
         let got = limb_depth(&[0, 0, 0, 2], 2, &[[DVec2::ZERO; 2]], &[[1.0; 2]], Interpolation::Linear, &mut out);
         assert!(matches!(got, Err(KernelError::Pixel { row: 1, column: 1, .. })));
+    }
+
+    #[test]
+    fn runs_end_where_the_label_changes_whatever_their_length() {
+        for length in 1..100 {
+            let labels = [vec![3; length], vec![4; 40]].concat();
+            assert_eq!((run_length(&labels), run_length(&labels[..length])), (length, length));
+        }
     }
 }

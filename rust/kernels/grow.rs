@@ -1,6 +1,6 @@
 //! Labels grow over the unlabelled rest of the figure: lines, antialiased rims, hair.
 //!
-//! PAPERS.md on Jain et al. 2010, section 3.3.1: the paper gives no depth to what lies outside every limb; here a
+//! docs/papers.md on Jain et al. 2010, section 3.3.1: the paper gives no depth to what lies outside every limb; here a
 //! figure's pixel without a label takes the label of the nearest labelled pixel (Euclidean, exact). Equally near ones:
 //! the one farther left, then the one farther up. Pixels close to a label are found by looking around them in order of
 //! distance; the others by the lower envelope of parabolas (Felzenszwalb and Huttenlocher 2012; Meijster, Roerdink,

@@ -1,6 +1,6 @@
 //! How opaque every drawn pixel is, and its colour without the paper.
 //!
-//! Jain, Sheikh, Mahler, Hodgins 2010, equations 14 and 15: alpha is the inverse of the grey value. PAPERS.md names what
+//! Jain, Sheikh, Mahler, Hodgins 2010, equations 14 and 15: alpha is the inverse of the grey value. docs/papers.md names what
 //! goes wrong with it and the other mattes. A picture with an alpha channel is put over white paper first, but for the
 //! matte that is this channel. Integers all the way, so that white is exactly 0 and black exactly 1.
 

@@ -39,6 +39,15 @@ def test_memory_order_and_kind_of_input_do_not_matter(case):
     assert np.array_equal(limb_depth(labels.astype(int).tolist() if labels.size else labels, ends, depths), want)
 
 
+@pytest.mark.parametrize("interpolation", ["linear", "perspective"])
+def test_depth_is_as_exact_at_16000_pixels_as_near_the_origin(interpolation):
+    labels = np.repeat(np.array([[1, 0, 2, 3, 1]], np.uint8), [3301, 77, 6500, 31, 6475], axis=1)
+    ends = np.array([[[16383, 7], [16380, 6.5]], [[3000.3, -20], [9000.7, 60]], [[9900, 0], [9905, 0.25]]])
+    depths = np.array([[0.1, 50], [3, 4.5], [40, 0.2]])
+    got = limb_depth(labels, ends, depths, interpolation=interpolation)
+    np.testing.assert_allclose(got, oracle.limb_depth(labels, ends, depths, interpolation), rtol=1e-6)
+
+
 def test_an_end_on_limb_takes_its_nearer_end():
     assert limb_depth([[1]], [[[3, 3], [3, 3]]], [[5.0, 2.0]])[0, 0] == 2.0
     assert limb_depth([[1]], [[[3, 3], [3, 3]]], [[2.0, 5.0]])[0, 0] == 2.0

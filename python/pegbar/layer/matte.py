@@ -64,7 +64,7 @@ def matte(image: ArrayLike, mode: Mode | Literal["auto"] = "auto", *, labels: Ar
         - "auto": "alpha" for a picture whose alpha channel is not all 255, else "fill" if there are labels, else
           "unmix".
     labels : (H, W) uint8, optional
-        0 where there is no limb; needed by "fill".
+        0 where there is no limb; needed by "fill". Labels grown over the whole figure give the cleanest rim.
 
     Returns
     -------
