@@ -17,7 +17,7 @@ pub fn depth_is_fine(z: f32) -> bool {
 /// Whether a drawing's coverage is allowed.
 #[inline(always)]
 pub fn alpha_is_fine(alpha: f32) -> bool {
-    (alpha >= 0.0) & (alpha <= 1.0)
+    (0.0..=1.0).contains(&alpha)
 }
 
 /// Whether a drawing of depth `z` is in front of a render of depth `rendered`: ties go to the render, a drawing
