@@ -3,6 +3,7 @@
 //! Jain, Sheikh, Mahler, Hodgins 2010, section 3.3.1: a pixel has the depth of the closest point of its limb's axis,
 //! the segment between the limb's two markers. Assumes labels 0 (no limb) or v + 1 (limb v).
 
+use crate::checks::first_fault;
 use crate::error::{KernelError, check_length};
 use glam::DVec2;
 use rayon::prelude::*;
@@ -100,8 +101,12 @@ pub fn limb_depth(
     let axes: Vec<Axis> =
         ends.iter().zip(end_depths).map(|([a, b], [za, zb])| Axis::new(*a, *b, *za, *zb, interpolation)).collect();
     let rows = out.par_chunks_mut(width).zip(labels.par_chunks(width)).enumerate();
-    rows.try_for_each(|(row, (out, labels))| limb_depth_row(row, labels, &axes, out))
+    rows.try_for_each(|(row, (out, labels))| limb_depth_row(row, labels, &axes, out)).map_err(|met| {
+        first_fault("labels", ABOVE, labels, width, |label| usize::from(*label) <= axes.len()).unwrap_or(met)
+    })
 }
+
+const ABOVE: &str = "a label above the number of limbs";
 
 fn limb_depth_row(row: usize, labels: &[u8], axes: &[Axis], out: &mut [f32]) -> Result<(), KernelError> {
     let mut column = 0;
@@ -112,12 +117,7 @@ fn limb_depth_row(row: usize, labels: &[u8], axes: &[Axis], out: &mut [f32]) -> 
             None => depths.fill(f32::INFINITY),
             Some(limb) => axes
                 .get(limb)
-                .ok_or(KernelError::Pixel {
-                    argument: "labels",
-                    problem: "a label above the number of limbs",
-                    row,
-                    column,
-                })?
+                .ok_or(KernelError::Pixel { argument: "labels", problem: ABOVE, row, column })?
                 .fill(row, column, depths),
         }
         column += length;
