@@ -58,16 +58,27 @@ enum Stroke {
 /// What of a surface tells whether its neighbour goes on: small, since every pair of neighbours asks.
 #[derive(Clone, Copy)]
 pub struct Facet {
-    /// Unit normal on the side that the camera sees.
+    /// Unit normal by the winding.
     normal: Vec3,
     object: u16,
+    /// Whether the camera sees the side of that normal.
+    is_front: bool,
+}
+
+impl Facet {
+    /// Cosine of the fold towards a neighbour. Where one shows its front and the other its back, either a smooth
+    /// surface turns away from the camera or the windings disagree: the smaller angle is the fold.
+    fn cosine(&self, other: &Facet) -> f32 {
+        let cosine = self.normal.dot(other.normal);
+        if self.is_front == other.is_front { cosine } else { cosine.abs() }
+    }
 }
 
 /// The surfaces' facets.
 pub fn facets(scene: &Scene<'_>, surfaces: &[Surface]) -> Vec<Facet> {
     let facet = |s: &Surface| {
-        let normal = scene.face_normal(s.triangle).normalize_or_zero().as_vec3() * s.facing;
-        Facet { normal, object: s.object }
+        let normal = scene.face_normal(s.triangle).normalize_or_zero().as_vec3();
+        Facet { normal, object: s.object, is_front: s.facing > 0.0 }
     };
     surfaces.par_iter().map(facet).collect()
 }
@@ -181,7 +192,7 @@ impl<'a> Pen<'a> {
         let (Some(a), Some(b)) = (facet(first), facet(second)) else { return false };
         let [here, there] = [first, second].map(|sample| band.reciprocal[sample]);
         a.object == b.object
-            && a.normal.dot(b.normal) > self.least_cosine
+            && a.cosine(b) > self.least_cosine
             && here <= there * self.greatest_ratio
             && there <= here * self.greatest_ratio
     }
@@ -189,7 +200,7 @@ impl<'a> Pen<'a> {
     fn folds_between(&self, band: &Band, first: usize, second: usize) -> bool {
         let facet = |sample: usize| self.facets.get((band.surface[sample] as usize).wrapping_sub(1));
         let (Some(a), Some(b)) = (facet(first), facet(second)) else { return false };
-        a.normal.dot(b.normal) <= self.least_cosine
+        a.cosine(b) <= self.least_cosine
     }
 
     fn surface(&self, band: &Band, sample: usize) -> Option<&Surface> {

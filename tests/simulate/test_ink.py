@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pegbar import Ink, Mesh, PerspectiveCamera, render_passes
-from tests.meshes import box, flat_camera, pixel_mesh, rectangle, torus
+from tests.meshes import box, flat_camera, pixel_mesh, rectangle, sheet, torus
 
 camera = flat_camera(60, 50)
 INK = (0.5, 0.0, 1.0, 1.0)
@@ -98,6 +98,22 @@ def test_a_crease_lies_on_its_surface_half_to_either_side(width, thickness):
     assert np.array_equal(got.object_id, plain.object_id)
     for none in (math.radians(91), None):
         assert not lines(render_passes([roof], camera, ink=Ink(width, INK, crease_angle=none))).any()
+
+
+def test_smooth_surfaces_have_no_creases_where_they_turn_away_nor_where_windings_disagree():
+    def strip(u, v):
+        turn, across = np.pi * u, (v - 0.5) * 0.8
+        return np.stack([2 * (u - 0.5), across * np.cos(turn), across * np.sin(turn)], axis=-1)
+
+    # From here a few samples that show the strip's back lie beside such that show its front.
+    view = PerspectiveCamera.look_at((0, 0.3, 4), (0, 0, 0), (121, 61), 0.6)
+    for mesh in (sheet(strip, 40, 4), torus(0.7, 0.22)):
+        with_creases, without = (render_passes([mesh], view, ink=Ink(2, INK, angle)) for angle in (math.pi / 3, None))
+        assert lines(without).any()
+        assert np.array_equal(lines(with_creases), lines(without))
+    square = rectangle(camera, 5, 5, 55, 45, 4.0)
+    mixed = Mesh(square.vertices, [[0, 1, 2], [0, 3, 2]], (0, 1, 0, 1))
+    assert not lines(render_passes([mixed], camera, ink=Ink(2, INK)))[5:45, 5:55].any()
 
 
 def test_a_line_where_two_objects_cut_each_other_has_its_own_width():
