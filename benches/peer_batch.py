@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pegbar.io.annotations import write_annotations
+from pegbar.io.annotations_writer import write_annotations
 from pegbar.io.exr import read_passes, write_exr
 from pegbar.io.frames import read_picture, write_image
 from pegbar.scene.drawing import Drawing, Limb

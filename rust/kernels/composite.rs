@@ -6,7 +6,9 @@
 
 use crate::checks::{WANT_ALPHA, WANT_DEPTH, alpha_is_fine, depth_is_fine, first_fault};
 use crate::color::{Conversion, Space};
-use crate::composite_block::{BLOCK, Hues, Pixel, Sample, Samples, Sums, alphas_are_fine, block, depths_are_fine};
+use crate::composite_block::{
+    BLOCK, Hues, Pixel, Sample, Samples, Sums, alphas_are_fine, are_zero, block, depths_are_fine,
+};
 use crate::error::{KernelError, check_length};
 use multiversion::multiversion;
 use rayon::prelude::*;
@@ -130,7 +132,7 @@ impl<'a, S: Sample> Job<'a, S> {
 }
 
 /// Composites one row of `width` pixels; tells whether all its values are allowed.
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn composite_row<S: Sample, T: Pixel, const CHANNELS: usize>(
     job: &Job<S>,
     row: usize,
@@ -147,6 +149,16 @@ fn composite_row<S: Sample, T: Pixel, const CHANNELS: usize>(
         let alpha = block(&layer.alpha[place..], 1, count, &mut spare.alpha);
         let depth = block(&layer.depth[place..], 1, count, &mut spare.depth);
         fine &= alphas_are_fine(alpha) & depths_are_fine(depth);
+        if are_zero(alpha) {
+            // Most of a picture shows neither drawing nor render.
+            let rows = (0..scale).map(|sub| (row * scale + sub) * width * scale + first * scale);
+            let mut rows = rows.map(|start| start..start + count * scale);
+            if rows.clone().all(|samples| S::are_zero(&job.samples[samples])) {
+                fine &= rows.all(|samples| depths_are_fine(&job.depth[samples]));
+                out.fill(T::NONE);
+                continue;
+            }
+        }
         for sub in 0..scale * scale {
             let start = (row * scale + sub / scale) * width * scale + first * scale + sub % scale;
             let rendered = block(&job.depth[start..], scale, count, &mut spare.rendered);

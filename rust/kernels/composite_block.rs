@@ -26,7 +26,7 @@ pub fn block<'a, T: Copy>(values: &'a [T], step: usize, count: usize, spare: &'a
 
 /// Whether all depths are allowed: not NaN, not -inf.
 #[inline(always)]
-pub fn depths_are_fine(depth: &Plane) -> bool {
+pub fn depths_are_fine(depth: &[f32]) -> bool {
     depth.iter().fold(true, |fine, &z| fine & depth_is_fine(z))
 }
 
@@ -34,6 +34,12 @@ pub fn depths_are_fine(depth: &Plane) -> bool {
 #[inline(always)]
 pub fn alphas_are_fine(alpha: &Plane) -> bool {
     alpha.iter().fold(true, |fine, &a| fine & alpha_is_fine(a))
+}
+
+/// Whether all values are 0.
+#[inline(always)]
+pub fn are_zero(values: &[f32]) -> bool {
+    values.iter().fold(0, |bits, value| bits | value.to_bits()) == 0
 }
 
 /// Samples of the render: premultiplied colour, and coverage.
@@ -73,6 +79,9 @@ pub trait Sample: Copy + Sync {
     /// all values are allowed.
     fn read(pixels: &[[Self; 4]; BLOCK], table: Option<&[f32; 256]>, out: &mut Samples) -> bool;
 
+    /// Whether all values of all pixels are 0.
+    fn are_zero(pixels: &[[Self; 4]]) -> bool;
+
     /// Whether the values of one pixel are allowed.
     fn allowed(pixel: &[Self; 4]) -> bool;
 }
@@ -99,6 +108,11 @@ impl Sample for u8 {
         true
     }
 
+    #[inline(always)]
+    fn are_zero(pixels: &[[u8; 4]]) -> bool {
+        pixels.iter().fold(0, |bits, pixel| bits | u32::from_ne_bytes(*pixel)) == 0
+    }
+
     fn allowed(_: &[u8; 4]) -> bool {
         true
     }
@@ -115,6 +129,11 @@ impl Sample for f32 {
             (red[i], green[i], blue[i], out.coverage[i]) = (r, g, b, a.clamp(0.0, 1.0));
         }
         pixels.as_flattened().iter().fold(true, |fine, value| fine & value.is_finite())
+    }
+
+    #[inline(always)]
+    fn are_zero(pixels: &[[f32; 4]]) -> bool {
+        are_zero(pixels.as_flattened())
     }
 
     fn allowed(pixel: &[f32; 4]) -> bool {
