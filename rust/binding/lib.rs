@@ -29,7 +29,7 @@ mod _kernels {
     #[pymodule_export]
     use crate::holdout::composite_matte;
     #[pymodule_export]
-    use crate::matte::{fill_matte, has_alpha, ink_alpha, matte};
+    use crate::matte::{fill_matte, has_alpha, ink_alpha, matte, own_alpha};
     #[pymodule_export]
     use crate::paint::{fill_polygon, stroke_polyline, unpremultiply};
     #[pymodule_export]

@@ -31,12 +31,22 @@ pub fn has_alpha(py: Python<'_>, image: Picture<'_>) -> PyResult<bool> {
 }
 
 #[pyfunction]
+pub fn own_alpha<'py>(py: Python<'py>, image: Picture<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    let [height, width] = [image.shape()[0], image.shape()[1]];
+    let out: Bound<'py, PyArray2<f32>> = empty(py, [height, width])?;
+    let mut target = out.readwrite();
+    let (image, alpha) = (slice("image", &image)?, target.as_slice_mut()?);
+    py.detach(|| kernel::own_alpha(image, width, alpha)).map_err(to_python)?;
+    drop(target);
+    Ok(out)
+}
+
+#[pyfunction]
 pub fn matte<'py>(py: Python<'py>, image: Picture<'py>, mode: &str) -> PyResult<ColorAndAlpha<'py>> {
     let mode = match mode {
         "ink" => Mode::Ink,
         "unmix" => Mode::Unmix,
-        "alpha" => Mode::Alpha,
-        _ => return Err(PyValueError::new_err("mode: want \"ink\", \"unmix\" or \"alpha\"")),
+        _ => return Err(PyValueError::new_err("mode: want \"ink\" or \"unmix\"")),
     };
     into_color_and_alpha(py, &image, |image, channels, width, color, alpha| {
         kernel::matte(mode, image, channels, width, color, alpha)

@@ -20,8 +20,6 @@ pub enum Mode {
     Ink,
     /// Colour to alpha: the least alpha that explains the pixel over white, and the colour that does.
     Unmix,
-    /// The picture's own alpha channel and colour.
-    Alpha,
 }
 
 fn ink<const C: usize>(pixel: &[u8; C]) -> f32 {
@@ -121,6 +119,18 @@ pub fn has_alpha(image: &[u8], channels: usize) -> bool {
     channels == 4 && image.as_chunks::<4>().0.iter().any(|pixel| pixel[3] != 255)
 }
 
+/// Writes the alpha channel of RGBA `image`.
+pub fn own_alpha(image: &[u8], width: usize, out: &mut [f32]) -> Result<(), KernelError> {
+    check_length("alpha", image.len() / 4, out.len())?;
+    let (pixels, _) = image.as_chunks::<4>();
+    out.par_chunks_mut(width.max(1)).zip(pixels.par_chunks(width.max(1))).for_each(|(out, pixels)| {
+        for (alpha, pixel) in out.iter_mut().zip(pixels) {
+            *alpha = OPACITY[usize::from(pixel[3])];
+        }
+    });
+    Ok(())
+}
+
 /// Writes a matte: straight colour, three bytes a pixel, and alpha.
 pub fn matte(
     mode: Mode,
@@ -133,12 +143,6 @@ pub fn matte(
     check_length("alpha", image.len() / channels.max(1), alpha.len())?;
     check_length("color", alpha.len() * 3, color.len())?;
     match (channels, mode) {
-        (3, Mode::Alpha) => {
-            return Err(KernelError::Argument {
-                argument: "image",
-                problem: "no alpha channel, and the matte asks for it",
-            });
-        }
         (3, _) => matte_rows::<3>(mode, image, width, color, alpha),
         (4, _) => matte_rows::<4>(mode, image, width, color, alpha),
         _ => return Err(KernelError::Argument { argument: "image", problem: "want 3 or 4 channels" }),
@@ -152,11 +156,6 @@ fn matte_rows<const C: usize>(mode: Mode, image: &[u8], width: usize, color: &mu
     rows.zip(alpha.par_chunks_mut(width)).for_each(|((pixels, colors), alphas)| match mode {
         Mode::Ink => shade(pixels, colors, alphas, |pixel| (over_white(pixel), ink(pixel))),
         Mode::Unmix => shade(pixels, colors, alphas, |pixel| unmix(over_white(pixel))),
-        Mode::Alpha => {
-            for ((pixel, color), alpha) in pixels.iter().zip(colors).zip(alphas) {
-                (*color, *alpha) = ([pixel[0], pixel[1], pixel[2]], OPACITY[usize::from(pixel[C - 1])]);
-            }
-        }
     });
 }
 
@@ -197,9 +196,11 @@ mod tests {
     }
 
     #[test]
-    fn own_alpha_is_refused_where_there_is_none() {
-        let got = matte(Mode::Alpha, &[0; 3], 3, 1, &mut [0; 3], &mut [0.0]);
-        assert!(matches!(got, Err(KernelError::Argument { argument: "image", .. })));
+    fn own_alpha_is_the_fourth_channel() {
+        let mut alpha = [9.0; 2];
+        assert_eq!(own_alpha(&[9, 9, 9, 255, 0, 0, 0, 51], 2, &mut alpha), Ok(()));
+        assert_eq!(alpha, [1.0, 0.2]);
+        assert!(own_alpha(&[0; 4], 1, &mut alpha).is_err());
         assert!(!has_alpha(&[0, 0, 0, 255], 4) && has_alpha(&[0, 0, 0, 254], 4) && !has_alpha(&[0; 3], 3));
     }
 }

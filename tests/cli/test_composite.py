@@ -130,10 +130,17 @@ def test_unknown_colours_are_counted_and_placed(shot, capsys):
     labels = draw(2)[1]
     labels[10, 20:23] = (1, 2, 3)
     write_image(shot.parent / "l.0002.png", labels)
-    assert run("composite", shot) == 0
+    assert run("composite", shot, "--keep-going") == 1
     error = capsys.readouterr().err
     assert "frame 2: " in error
     assert "3 pixels match no limb, first #010203 at row 10, column 20" in error
+    assert finals(shot) == ["f.0001.png", "f.0003.png", "f.0004.png"]
+    shot.write_text(shot.read_text().replace("[drawing]", "[drawing]\nunknown_colors = 'note'"))
+    assert run("composite", shot) == 0
+    assert "3 pixels match no limb" in capsys.readouterr().err
+    shot.write_text(shot.read_text() + "[drawing.palette]\n'#010203' = 'body'\n")
+    assert run("composite", shot) == 0
+    assert capsys.readouterr().err == ""
 
 
 def test_a_matte_that_the_drawing_lacks_is_refused(shot, capsys):

@@ -86,7 +86,7 @@ def test_at_every_crossing_the_order_is_the_3d_order(walk):
         in_front, behind = solid & (far < nearest), solid & (near > farthest)
         # Colours tell which layer is seen: the render's where it is nearer than its limb's nearest end, and so on.
         assert np.abs(final[in_front][:, :3] - display(beauty[in_front])).max(initial=0) <= 1
-        assert np.array_equal(final[behind][:, :3], drawn.color[behind])
+        assert np.array_equal(final[behind][:, :3], drawn.color[..., :3][behind])
         met[True] += in_front.sum()
         met[False] += behind.sum()
     area = shot.frames and marks.image_size[0] * marks.image_size[1]
@@ -101,10 +101,10 @@ def test_no_fringe_stands_round_the_figure(walk):
         soft = (drawn.alpha > 0) & (drawn.alpha < 1)
         assert soft.any()
         over = soft & (beauty[..., 3] == 1) & (near > drawn.depth)
-        want = drawn.alpha[over, None] * drawn.color[over] + (1 - drawn.alpha[over, None]) * display(beauty[over])
+        want = drawn.alpha[over, None] * drawn.color[..., :3][over] + (1 - drawn.alpha[over, None]) * display(beauty[over])
         assert np.abs(final[over][:, :3] - want).max(initial=0) <= 1.5
         alone = soft & (beauty[..., 3] == 0)
-        assert np.array_equal(final[alone][:, :3], drawn.color[alone])
+        assert np.array_equal(final[alone][:, :3], drawn.color[..., :3][alone])
         assert np.abs(final[alone][:, 3] - 255 * drawn.alpha[alone]).max(initial=0) <= 0.5
         lost = soft & (drawn.alpha > 0.5) & ~np.isfinite(drawn.depth)
         assert not lost.any()

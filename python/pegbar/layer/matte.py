@@ -15,7 +15,10 @@ Mode = Literal["ink", "unmix", "fill", "alpha"]
 
 @dataclass(frozen=True, eq=False)
 class Matte:
-    """A drawing off its paper: straight ``color`` (H, W, 3) uint8, ``alpha`` (H, W) float32 in 0..1, and its mode."""
+    """A drawing off its paper: straight ``color``, ``alpha`` (H, W) float32 in 0..1, and its mode.
+
+    ``color`` is (H, W, 3) uint8; for the mode "alpha" it is the (H, W, 4) picture itself.
+    """
 
     color: NDArray[np.uint8]
     alpha: NDArray[np.float32]
@@ -96,4 +99,6 @@ def matte(image: ArrayLike, mode: Mode | Literal["auto"] = "auto", *, labels: Ar
         if labels is None:
             raise ValueError('labels: want limb labels for the matte "fill", got None')
         return Matte(*_kernels.fill_matte(image, labels), mode)
+    if mode == "alpha":
+        return Matte(image, _kernels.own_alpha(image), mode)
     return Matte(*_kernels.matte(image, mode), mode)

@@ -23,7 +23,7 @@ FAINT = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """A drawn frame: ``color`` (H, W, 3) uint8 straight, ``alpha`` and ``depth`` (H, W) float32, and what to note."""
+    """A drawn frame: ``color`` (H, W, 3|4) uint8 straight, ``alpha`` and ``depth`` (H, W) float32, and what to note."""
 
     color: NDArray[np.uint8]
     alpha: NDArray[np.float32]
@@ -120,6 +120,8 @@ def _painted_labels(shot: Shot, frame: int, picture: NDArray[np.uint8]) -> tuple
         return found.labels, ()
     (row, column), color = found.first_unmatched, "#" + bytes(found.first_unmatched_color[:3]).hex()
     note = f"frame {frame}: {path}: {found.unmatched} pixels match no limb, first {color} at row {row}, column {column}"
+    if shot.settings.drawing.refuses_unknown_colors:
+        raise ValueError(f"{note} (drawing.palette can name it, drawing.tolerance allow for it)")
     return found.labels, (note,)
 
 

@@ -55,11 +55,18 @@ class DrawingSection(Section):
     palette: dict[Color, str] = {}
     tolerance: float = Field(0.0, ge=0, le=442, allow_inf_nan=False)
     background: list[Color] = ["#000000"]
+    unknown_colors: Literal["auto", "error", "note"] = "auto"
     reach: float | None = Field(None, ge=0, allow_inf_nan=False)
     half_width: float | None = Field(None, gt=0, allow_inf_nan=False)
     threshold: int = Field(128, ge=0, le=255)
     matte: Literal["auto", "ink", "unmix", "fill", "alpha"] = "auto"
     interpolation: Literal["linear", "perspective"] = "linear"
+
+
+    @property
+    def refuses_unknown_colors(self) -> bool:
+        """Whether a colour that stands for no limb fails its frame: by default where colours are to be exact."""
+        return self.unknown_colors == "error" or (self.unknown_colors == "auto" and self.tolerance == 0)
 
 
 class CameraSection(Section):
