@@ -5,39 +5,15 @@ One thread: run with RAYON_NUM_THREADS=1. Ours and the peer alternate, medians o
 
 from __future__ import annotations
 
-import statistics
-import time
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Iterator
 
 import numpy as np
 
+from benches.measure import Row, alternate, milliseconds
 from pegbar import depth_composite
 from tests.oracles import composite as oracle
 
 FULL_HD, ULTRA_HD = (1080, 1920), (2160, 3840)
-
-
-class Row(NamedTuple):
-    """One comparison: milliseconds, peer / ours, and what says that both did the same work."""
-
-    name: str
-    ours: float
-    peer: float
-    ratio: float
-    correctness: str
-
-
-def alternate(ours: Callable[[], object], peer: Callable[[], object], rounds: int = 15) -> tuple[float, float]:
-    """Medians in milliseconds, after one run of each."""
-    times: tuple[list[float], list[float]] = ([], [])
-    for turn in range(rounds + 1):
-        for work, found in zip((ours, peer), times, strict=True):
-            begin = time.perf_counter()
-            work()
-            if turn:
-                found.append(1e3 * (time.perf_counter() - begin))
-    return statistics.median(times[0]), statistics.median(times[1])
 
 
 def random_frame(size: tuple[int, int]) -> list[np.ndarray]:
@@ -73,20 +49,25 @@ def copy_row(name: str, case: list[np.ndarray]) -> Row:
     source = np.ones(moved // 2, np.uint8)
     target = source.copy()
     ours, peer = alternate(lambda: depth_composite(*case), lambda: np.copyto(target, source))
-    return Row(name, ours, peer, peer / ours, levels(case))
+    times = milliseconds(ours), milliseconds(peer)
+    return Row(name, times[0], f"np.copyto {times[1]}", f"{ours / peer:.2f}x the copy", "promise 3x", levels(case))
 
 
 def oracle_row(case: list[np.ndarray]) -> Row:
     """Ours beside vectorised numpy in float64."""
-    ours, peer = alternate(lambda: depth_composite(*case), lambda: oracle.depth_composite(*case), 3)
-    return Row("uint8 1080p / numpy oracle", ours, peer, peer / ours, levels(case))
+    ours, peer = alternate(lambda: depth_composite(*case), lambda: oracle.depth_composite(*case), rounds=3)
+    times = milliseconds(ours), milliseconds(peer)
+    return Row(
+        "depth_composite uint8", times[0], f"numpy {times[1]}", f"{peer / ours:.0f}x", "promise 10x", levels(case)
+    )
 
 
 def growth_row() -> Row:
     """1080p beside 4K: the ratio is how many times dearer 4K is."""
     small, large = random_frame(FULL_HD), random_frame(ULTRA_HD)
     ours, peer = alternate(lambda: depth_composite(*small), lambda: depth_composite(*large))
-    return Row("uint8 1080p / 4K", ours, peer, peer / ours, "4.00 is in proportion")
+    times = milliseconds(ours), milliseconds(peer)
+    return Row("depth_composite uint8", times[0], f"ours at 4K {times[1]}", f"{peer / ours:.2f}x", "promise 4x +- 10%")
 
 
 def zover_row(case: list[np.ndarray]) -> Row:
@@ -105,27 +86,21 @@ def zover_row(case: list[np.ndarray]) -> Row:
         buffer.set_pixels(oiio.ROI(), pixels)
     floats = [drawing, alpha, depth, planes[1][0], rendered_depth]
     work = lambda: oiio.ImageBufAlgo.zover(out, front, back, False, oiio.ROI(), 1)  # noqa: E731
-    ours, peer = alternate(lambda: depth_composite(*floats), work, 5)
+    ours, peer = alternate(lambda: depth_composite(*floats), work, rounds=5)
     difference = np.abs(out.get_pixels(oiio.FLOAT)[..., :4] - depth_composite(*floats)).max()
-    return Row("float32 1080p / OpenImageIO zover", ours, peer, peer / ours, f"max difference {difference:.3g}")
+    times, agreement = (milliseconds(ours), milliseconds(peer)), f"largest difference {difference:.1e}"
+    return Row(
+        "depth_composite float32", times[0], f"oiio zover {times[1]}", f"{peer / ours:.1f}x", "promise 5x", agreement
+    )
 
 
-def run() -> list[Row]:
-    """All comparisons."""
+def run() -> Iterator[Row]:
+    """Yield all comparisons, at 1080p unless said."""
     worst, shot = random_frame(FULL_HD), shot_frame(FULL_HD)
     three = [np.ascontiguousarray(worst[0][..., :3]), *worst[1:]]
-    return [
-        copy_row("uint8 1080p random / copy", worst),
-        copy_row("uint8 1080p random, RGB drawing / copy", three),
-        copy_row("uint8 1080p figure and ring / copy", shot),
-        oracle_row(worst),
-        zover_row(worst),
-        growth_row(),
-    ]
-
-
-if __name__ == "__main__":
-    for row in run():
-        print(
-            f"{row.name:42} ours {row.ours:8.2f} ms  peer {row.peer:8.2f} ms  ratio {row.ratio:6.2f}  {row.correctness}"
-        )
+    yield copy_row("depth_composite uint8, all at random", worst)
+    yield copy_row("depth_composite uint8, all at random, RGB drawing", three)
+    yield copy_row("depth_composite uint8, figure and ring", shot)
+    yield oracle_row(worst)
+    yield zover_row(worst)
+    yield growth_row()

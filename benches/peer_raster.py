@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import math
 import os
-import statistics
-import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benches.measure import alternate
 from pegbar import Ink, Mesh, Passes, PerspectiveCamera, render_passes
 
 SAMPLES = 2
@@ -81,17 +80,6 @@ def torus(rings: int, sides: int) -> Mesh:
     return Mesh(vertices, np.concatenate([np.stack([p, q, r], axis=1), np.stack([p, r, s], axis=1)]), colors)
 
 
-def paired(*works: Callable[[], object], rounds: int = 9) -> list[float]:
-    """Median milliseconds of each of ``works``, taken in turn so that a noisy machine treats them alike."""
-    times: list[list[float]] = [[] for _ in works]
-    for _ in range(rounds):
-        for work, taken in zip(works, times, strict=True):
-            start = time.perf_counter()
-            work()
-            taken.append(1e3 * (time.perf_counter() - start))
-    return [statistics.median(taken) for taken in times]
-
-
 def buffers() -> list[NDArray[Any]]:
     """Passes of the supersampled size, not yet touched."""
     plane = (HEIGHT, WIDTH)
@@ -116,7 +104,7 @@ def beside_fills(mesh: Mesh) -> Iterator[tuple[object, ...]]:
         def render(options: dict[str, Any] = options) -> Passes:
             return render_passes([mesh], CAMERA, samples=SAMPLES, **options)
 
-        ours, fresh, again = paired(render, lambda: fill(buffers()), lambda: fill(used))
+        ours, fresh, again = alternate(render, lambda: fill(buffers()), lambda: fill(used))
         yield (
             f"render_passes 33k triangles, {name}",
             f"{ours:.0f} ms",
@@ -132,7 +120,7 @@ def growth() -> Iterator[tuple[object, ...]]:
     for rings, sides in ((32, 16), (100, 50), (320, 158), (1000, 500)):
         mesh = torus(rings, sides)
         count = len(mesh.triangles)
-        (taken,) = paired(lambda mesh=mesh: render_passes([mesh], CAMERA, samples=SAMPLES), rounds=5)
+        (taken,) = alternate(lambda mesh=mesh: render_passes([mesh], CAMERA, samples=SAMPLES), rounds=5)
         yield f"render_passes {count} triangles, flat", f"{taken:.0f} ms", f"{count / taken / 1e3:.2f} M triangles/s"
 
 
@@ -152,7 +140,7 @@ def beside_llvmpipe(mesh: Mesh) -> Iterator[tuple[object, ...]]:
     def render() -> Passes:
         return render_passes([mesh], CAMERA, samples=SAMPLES, near=NEAR, light=(0.4, 0.8, 0.45), bands=BANDS)
 
-    ours, drawn, both = paired(render, draw, lambda: (draw(), read()))
+    ours, drawn, both = alternate(render, draw, lambda: (draw(), read()))
     yield (
         "render_passes 33k triangles, bands",
         f"{ours:.0f} ms",

@@ -26,7 +26,7 @@ def test_twenty_kills_and_one_whole_run_give_the_undisturbed_bytes(tmp_path):
 
 
 def test_a_4k_frame_is_composited(tmp_path):
-    shot = make_large_shot(tmp_path, 1, 3840, 2160)
+    shot = make_large_shot(tmp_path, 1, (3840, 2160), 2)
     assert main(["composite", str(tmp_path / "shot.toml")]) == 0
     assert shot.output("frames", 1).is_file()
 

@@ -101,7 +101,9 @@ def test_no_fringe_stands_round_the_figure(walk):
         soft = (drawn.alpha > 0) & (drawn.alpha < 1)
         assert soft.any()
         over = soft & (beauty[..., 3] == 1) & (near > drawn.depth)
-        want = drawn.alpha[over, None] * drawn.color[..., :3][over] + (1 - drawn.alpha[over, None]) * display(beauty[over])
+        want = drawn.alpha[over, None] * drawn.color[..., :3][over] + (1 - drawn.alpha[over, None]) * display(
+            beauty[over]
+        )
         assert np.abs(final[over][:, :3] - want).max(initial=0) <= 1.5
         alone = soft & (beauty[..., 3] == 0)
         assert np.array_equal(final[alone][:, :3], drawn.color[..., :3][alone])

@@ -16,7 +16,6 @@ from pegbar.layer.matte import ink_alpha, matte
 from pegbar.layer.segmentation import grow_labels, palette_labels, segment_stick_figure
 from pegbar.shot.plan import Shot
 
-
 # Coverage below which ink is taken for the grain of the paper: 25 levels of 255, where scans and JPEG stay within 15.
 FAINT = 0.1
 

@@ -62,7 +62,6 @@ class DrawingSection(Section):
     matte: Literal["auto", "ink", "unmix", "fill", "alpha"] = "auto"
     interpolation: Literal["linear", "perspective"] = "linear"
 
-
     @property
     def refuses_unknown_colors(self) -> bool:
         """Whether a colour that stands for no limb fails its frame: by default where colours are to be exact."""
