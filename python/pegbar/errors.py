@@ -5,6 +5,16 @@ from __future__ import annotations
 from os import PathLike, fspath
 
 
+def describe(error: BaseException) -> str:
+    """Return ``error`` as one line for people: an OSError with its file first and no error number."""
+    if isinstance(error, OSError) and error.strerror:
+        reason = error.strerror[0].lower() + error.strerror[1:]
+        text = f"{fspath(error.filename)}: {reason}" if error.filename is not None else reason
+    else:
+        text = str(error)
+    return " ".join(text.split()) or type(error).__name__
+
+
 class PegbarError(Exception):
     """Base of everything that pegbar raises on its own account."""
 

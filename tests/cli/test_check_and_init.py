@@ -84,6 +84,72 @@ def test_init_says_what_it_cannot_find(tmp_path, capsys):
     assert "several sequences" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("beauty", "depth"),
+    [
+        ("render/beauty", "render/depth"),
+        ("passes/beauty", "passes/depth"),
+        ("render/beauty/b", "render/depth/d"),
+        ("beauty/b", "depth/depth"),
+        ("beauty", "depth"),
+        ("renders/shot_rgba", "renders/shot_z"),
+    ],
+)
+def test_init_finds_the_rendered_depth_and_never_writes_over_it(tmp_path, beauty, depth):
+    make_shot(tmp_path).unlink()
+    for path in list(tmp_path.glob("l.*.png")):
+        path.rename(tmp_path / path.name.replace("l.", "labels."))
+    for path in list(tmp_path.glob("p.*.exr")):
+        for name in (beauty, depth):
+            target = tmp_path / f"{name}.{path.name[2:]}"
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_bytes(path.read_bytes())
+        path.unlink()
+    rendered = {path: path.read_bytes() for path in tmp_path.rglob("*.exr")}
+    assert run("init", tmp_path) == 0
+    text = (tmp_path / "shot.toml").read_text()
+    assert f'beauty = "{beauty}.####.exr"' in text
+    assert f'\ndepth = "{depth}.####.exr"' in text
+    assert run("check", tmp_path / "shot.toml") == run("depth", tmp_path / "shot.toml") == 0
+    assert {path: path.read_bytes() for path in rendered} == rendered
+
+
+def test_init_takes_the_drawings_that_are_named(tmp_path, capsys):
+    make_shot(tmp_path).unlink()
+    (tmp_path / "clean").mkdir()
+    for path in list(tmp_path.glob("d.*.png")):
+        (tmp_path / "clean" / path.name).write_bytes(path.read_bytes())
+    assert run("init", tmp_path) == 2
+    assert "--drawings" in capsys.readouterr().err
+    assert run("init", tmp_path, "--drawings", "clean/d.####.png") == 0
+    assert 'frames = "clean/d.####.png"' in (tmp_path / "shot.toml").read_text()
+
+
+def test_words_inside_names_say_nothing(tmp_path):
+    for name in ("man_climb", "man_walk"):
+        write_image(tmp_path / f"{name}.0001.png", np.zeros((4, 4, 3), np.uint8))
+    assert run("init", tmp_path) == 2
+    assert run("init", tmp_path, "--drawings", "man_walk.####.png") == 0
+    assert "# labels" in (tmp_path / "shot.toml").read_text()
+
+
+def test_one_cause_in_many_frames_is_one_line(tmp_path, capsys):
+    shot = make_shot(tmp_path, 6)
+    shot.write_text(shot.read_text().replace("size = [48, 32]", "size = [48, 31]"))
+    assert run("check", shot) == 1
+    captured = capsys.readouterr()
+    assert len(captured.err.splitlines()) == 1
+    assert "6 frames: 1-6" in captured.err
+    assert "1 problem\n" in captured.out
+
+
+def test_a_wrong_unit_is_suspected(tmp_path, capsys):
+    shot = make_shot(tmp_path)
+    shot.write_text(shot.read_text().replace("[passes]", '[passes]\nunit = "cm"'))
+    assert run("check", shot) == 1
+    assert "passes.unit" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("command", ["init", "check", "depth", "composite", "demo"])
 def test_every_command_has_help_with_an_example(command, capsys):
     assert run(command, "--help") == 0

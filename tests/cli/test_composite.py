@@ -65,7 +65,7 @@ def test_settings_and_marks_that_decide_the_result_make_frames_out_of_date(shot,
     assert "4 frames made" in capsys.readouterr().out
     move_mark(shot, 2, "pelvis", (15, 27))
     assert run("composite", shot) == 0
-    assert "1 frames made, 3 up to date" in capsys.readouterr().out
+    assert "1 frame made, 3 up to date" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
@@ -90,7 +90,7 @@ def test_without_keep_going_the_first_failure_ends_the_run(shot, capsys):
     captured = capsys.readouterr()
     assert "frame 1: " in captured.err
     assert "the file is empty" in captured.err
-    assert "0 frames made, 3 not done, 1 failed" in captured.out
+    assert "0 frames made, 1 failed, 3 not begun" in captured.out
     assert finals(shot) == []
 
 
@@ -249,3 +249,75 @@ def test_depth_is_that_of_the_limbs_and_can_be_looked_at(shot):
     assert picture[10, 35, 0] > picture[10, 35, 2]
     assert picture[10, 10, 2] > picture[10, 10, 0]
     assert picture[0, 0, 3] == 0
+
+
+def test_an_output_that_would_replace_an_input_or_another_output_is_refused(shot, monkeypatch, capsys):
+    monkeypatch.chdir(shot.parent)
+    before = {path: path.read_bytes() for path in shot.parent.iterdir() if path.is_file()}
+    for options in (
+        ["--output", "d.####.png"],
+        ["--output", "./x/../l.%04d.png"],
+        ["--output", "p.####.exr"],
+        ["--output", "o.####.png", "--holdout", "o.####.png"],
+    ):
+        (shot.parent / "x").mkdir(exist_ok=True)
+        assert run("composite", shot, *options) == 2
+        assert "writing would replace it" in capsys.readouterr().err
+    assert {path: path.read_bytes() for path in shot.parent.iterdir() if path.is_file()} == before
+
+
+@pytest.mark.parametrize("hold", ["1", "'sparse'"])
+def test_a_missing_drawing_does_not_shift_the_marks_of_the_others(shot, capsys, hold):
+    assert run("depth", shot) == 0
+    want = read_image(shot.parent / "depth/z.0004.png")
+    shot.write_text(shot.read_text().replace("[drawing]", f"[drawing]\nhold = {hold}"))
+    for number in (1, 2):
+        (shot.parent / f"d.{number:04d}.png").unlink()
+        capsys.readouterr()
+        if number == 1 or hold != "1":
+            assert run("check", shot) == 1
+            assert "drawing.first_marked" in capsys.readouterr().err
+    shot.write_text(shot.read_text().replace("[drawing]", "[drawing]\nfirst_marked = 1"))
+    assert run("depth", shot, "--frames", "4") == 0
+    assert np.array_equal(read_image(shot.parent / "depth/z.0004.png"), want)
+
+
+def test_jpeg_frames_are_put_over_white(shot, monkeypatch):
+    monkeypatch.chdir(shot.parent)
+    assert run("composite", shot, "--output", "o/f.####.jpg", "--frames", "1") == 0
+    final = read_image("o/f.0001.jpg").astype(int)
+    assert final.shape == (HEIGHT, WIDTH, 3)
+    assert (final[:2] > 245).all()
+    assert abs(final[15, 12] - RED[:3]).max() < 12
+
+
+def test_a_figure_without_any_limb_colour_and_a_lost_alpha_are_refused(shot, capsys):
+    write_image(shot.parent / "l.0002.png", np.zeros((HEIGHT, WIDTH, 3), np.uint8))
+    write_image(shot.parent / "d.0003.png", draw(3)[0][..., :3])
+    assert run("composite", shot, "--keep-going") == 1
+    lines = sorted(capsys.readouterr().err.splitlines())
+    assert "frame 2: " in lines[0]
+    assert "no limb is marked" in lines[0]
+    assert "frame 3: " in lines[1]
+    assert "alpha" in lines[1]
+    assert finals(shot) == ["f.0001.png", "f.0004.png"]
+
+
+def test_a_picture_beauty_needs_a_depth_pass(shot, monkeypatch, capsys):
+    monkeypatch.chdir(shot.parent)
+    for frame in (1, 2, 3, 4):
+        beauty = np.rint(bar()[""] * 255).astype(np.uint8)
+        write_image(f"b.{frame:04d}.png", beauty)
+    assert run("composite", shot, "--beauty", "b.####.png", "--output", "o/f.####.png") == 2
+    assert "passes.depth" in capsys.readouterr().err
+    assert run("composite", shot) == 0
+    assert run("composite", shot, "--beauty", "b.####.png", "--depth", "p.####.exr", "--output", "o/f.####.png") == 0
+    assert np.array_equal(read_image("o/f.0002.png"), read_image("final/f.0002.png"))
+
+
+def test_frames_in_work_are_finished_and_counted_when_one_fails(shot, capsys):
+    (shot.parent / "d.0001.png").write_bytes(b"")
+    assert run("composite", shot, "--jobs", 2) == 1
+    out = capsys.readouterr().out
+    made = len(finals(shot))
+    assert f"{made} frame{'' if made == 1 else 's'} made, 1 failed" in out

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
@@ -46,25 +47,30 @@ def run_stage(name: str, stage: Stage, options: BatchOptions) -> int:
     if not frames:
         raise ValueError("the shot has no frames")
     stage.prepare(frames)
-    made, failed, notes = 0, [], 0
-    with closing(run_frames(stage, frames, jobs=options.jobs)) as results, progress(name, len(frames)) as advance:
+    count = Counter[str]()
+    results = run_frames(stage, frames, jobs=options.jobs, go_on=lambda: options.keep_going or not count["failed"])
+    with closing(results), progress(name, len(frames)) as advance:
         for result in results:
             advance()
             if result.error is not None:
-                failed.append(result)
+                count["failed"] += 1
                 _complain(result)
-                if not options.keep_going:
-                    break
                 continue
-            made += result.value.made
-            notes += len(result.value.notes)
+            count["made" if result.value.made else "up to date"] += 1
+            count["warnings"] += len(result.value.notes)
             for note in result.value.notes:
-                print(f"pegbar: {note}", file=sys.stderr)
-    where = stage.outputs(frames[0])[0].parent
-    rest = len(frames) - made - len(failed)
-    state = "not done" if failed and not options.keep_going else "up to date"
-    print(f"{name}: {made} frames made, {rest} {state}, {len(failed)} failed, in {os.path.relpath(where)}")
-    return 1 if failed else 0
+                print(f"pegbar: warning: {note}", file=sys.stderr)
+    _summarise(name, stage, frames, count)
+    return 1 if count["failed"] else 0
+
+
+def _summarise(name: str, stage: Stage, frames: list[int], count: Counter[str]) -> None:
+    left = len(frames) - count["made"] - count["up to date"] - count["failed"]
+    parts = [f"{count['made']} frame{'' if count['made'] == 1 else 's'} made"]
+    parts += [f"{count[state]} {state}" for state in ("up to date", "failed") if count[state]]
+    parts += [f"{left} not begun"] if left else []
+    parts += [f"{count['warnings']} warning{'' if count['warnings'] == 1 else 's'}"] if count["warnings"] else []
+    print(f"{name}: {', '.join(parts)}, in {os.path.relpath(stage.outputs(frames[0])[0].parent)}")
 
 
 def _complain(result: FrameResult) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from contextlib import closing
 from pathlib import Path
@@ -11,6 +12,7 @@ from cyclopts import Parameter
 
 from pegbar.cli.batch import BatchOptions, progress
 from pegbar.errors import ShotError
+from pegbar.io.numbers import format_frames
 from pegbar.shot.batch import run_frames
 from pegbar.shot.check import CheckStage
 from pegbar.shot.plan import open_shot
@@ -40,8 +42,23 @@ def check(
         for result in results:
             advance()
             problems[result.frame] = [result.error] if result.error else list(result.value)
-    lines = [line for frame in sorted(problems) for line in problems[frame]]
+    lines = grouped([line for frame in sorted(problems) for line in problems[frame]])
     for line in lines:
         print(line, file=sys.stderr)
     print(f"check: {len(chosen)} frames read, {len(lines) or 'no'} problem{'' if len(lines) == 1 else 's'}")
     return 1 if lines else 0
+
+
+def grouped(lines: list[str]) -> list[str]:
+    """Return ``lines`` with those that differ in numbers only as one, which says how many frames it stands for."""
+    groups: dict[str, list[str]] = {}
+    for line in lines:
+        groups.setdefault(re.sub(r"\d+", "#", line), []).append(line)
+    merged = []
+    for same in groups.values():
+        if len(same) < 4:
+            merged += same
+        else:
+            frames = [int(number[1]) for line in same if (number := re.match(r"frame (-?\d+):", line))]
+            merged.append(f"{same[0]} (and so in {len(same)} frames: {format_frames(frames)})")
+    return merged

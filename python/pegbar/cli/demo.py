@@ -48,10 +48,14 @@ def demo(
     write_image(sheet, contact_sheet(finals, columns=6))
     write_animation(animation, _finals(shot, chosen), shot.settings.shot.frame_rate)
     print(f"\nMade in {time.perf_counter() - start:.1f} s:")
-    print(f"  {path}  the shot file: try pegbar check, depth, composite on it")
-    print(f"  {final_path(shot, chosen[0]).parent}  finished frames")
-    print(f"  {sheet}  drawing, depth and finished frame side by side")
-    print(f"  {animation}  the animation: open it in a browser")
+    for made, what in (
+        (animation, "the animation: open it in a browser"),
+        (sheet, "drawing, depth and finished frame side by side"),
+        (folder / "final", "the finished frames"),
+        (path, "the shot file: check, depth and composite take it"),
+        (folder / "clip.bvh", "the dance as a motion-capture clip; truth.npz holds its markers and cameras"),
+    ):
+        print(f"  {made}  {what}")
     return 0
 
 

@@ -14,6 +14,7 @@ from pegbar.shot.start import start_shot
 def init(
     frames: Path,
     *,
+    drawings: Annotated[str | None, Parameter(help="The drawn frames, like d.####.png, if there is a choice.")] = None,
     output: Annotated[Path | None, Parameter(help="The shot file (default: FRAMES/shot.toml).")] = None,
     overwrite: Annotated[bool, Parameter(negative="", help="Replace a shot file that is there.")] = False,
 ) -> int:
@@ -29,7 +30,7 @@ def init(
     target = output or frames / "shot.toml"
     if target.exists() and not overwrite:
         raise FileExistsError(f"{target}: is there already (--overwrite replaces it)")
-    text = start_shot(frames)
+    text = start_shot(frames, drawings)
     with complete_file(target) as part:
         part.write_text(text, encoding="utf-8")
     print(f"init: wrote {target}; look it over, then run: pegbar check {target}")

@@ -11,6 +11,8 @@ from importlib.metadata import version
 
 from cyclopts import App, CycloptsError
 
+from pegbar.errors import describe
+
 app = App(
     name="pegbar",
     help="Hand-drawn animation and motion capture: depth for drawings, and depth compositing with 3D renders.",
@@ -60,11 +62,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
     except CycloptsError as error:
         return _fail(f"{error} (see pegbar --help)")
-    except (ValueError, OSError) as error:
+    except OSError as error:
+        return _fail(describe(error))
+    except ValueError as error:
         return _fail(str(error))
-    except KeyboardInterrupt:
-        print("pegbar: interrupted; the finished frames are kept, run it again to go on", file=sys.stderr)
-        return 130
     return code if isinstance(code, int) else 0
 
 

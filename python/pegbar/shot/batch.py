@@ -12,11 +12,13 @@ import os
 import signal
 import sys
 from collections import deque
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import Any, Protocol
+
+from pegbar.errors import describe
 
 _ONE_THREAD = {"RAYON_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
@@ -37,19 +39,24 @@ class FrameResult:
     error: str | None = None
 
 
-def run_frames(task: Task, frames: list[int], *, jobs: int | None = None) -> Generator[FrameResult]:
+def run_frames(
+    task: Task, frames: list[int], *, jobs: int | None = None, go_on: Callable[[], bool] = lambda: True
+) -> Generator[FrameResult]:
     """Yield a result a frame, as they are finished.
 
     ``jobs`` is the number of worker processes (None: one a core); with one job or one frame the work is done here.
-    Closing the iterator ends the workers; a frame in work is then left as it was before.
+    When ``go_on`` says no, no further frame is begun and those in work are finished. Closing the iterator ends the
+    workers at once; a frame in work is then left as it was before.
     """
     count = min(jobs or available_cores(), len(frames))
     if count <= 1:
-        yield from (attempt(task, frame) for frame in frames)
+        for frame in frames:
+            if go_on():
+                yield attempt(task, frame)
         return
     pool = _Pool(task, count)
     try:
-        yield from pool.run(deque(frames))
+        yield from pool.run(deque(frames), go_on)
     finally:
         pool.close()
 
@@ -64,7 +71,7 @@ def attempt(task: Task, frame: int) -> FrameResult:
     try:
         return FrameResult(frame, task(frame))
     except (ValueError, OSError, MemoryError) as error:
-        return FrameResult(frame, error=" ".join(str(error).split()) or type(error).__name__)
+        return FrameResult(frame, error=describe(error))
 
 
 class _Pool:
@@ -86,11 +93,11 @@ class _Pool:
         self.workers[ours] = worker
         return ours
 
-    def run(self, frames: deque[int]) -> Iterator[FrameResult]:
+    def run(self, frames: deque[int], go_on: Callable[[], bool]) -> Iterator[FrameResult]:
         busy: dict[Connection, int] = {}
         idle = list(self.workers)
-        while frames or busy:
-            while idle and frames:
+        while busy or (frames and go_on()):
+            while idle and frames and go_on():
                 pipe = idle.pop()
                 busy[pipe] = frames.popleft()
                 with suppress(ConnectionError):

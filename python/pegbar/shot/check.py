@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from pegbar.errors import describe
 from pegbar.shot.drawn import read_drawn
 from pegbar.shot.plan import Shot
 from pegbar.shot.stages import CompositeStage, check_passes
@@ -31,6 +33,7 @@ class CheckStage:
                 beauty, depth, _ = stage.read_rendered(frame)
                 if drawn is not None:
                     check_passes(frame, self.shot.beauty.path(frame), drawn, beauty, depth)
+                    problems += _units(frame, drawn.depth, depth)
             except (ValueError, OSError) as error:
                 problems.append(_in_frame(frame, error))
         return tuple(problems)
@@ -53,6 +56,20 @@ class CheckStage:
         ]
 
 
+def _units(frame: int, drawn: NDArray[np.float32], rendered: NDArray[np.float32]) -> list[str]:
+    """Depths that are so far apart that one of them must be in another unit."""
+    places = [depth[np.isfinite(depth)] for depth in (drawn, rendered)]
+    if not all(place.size for place in places):
+        return []
+    ours, theirs = (float(np.median(place)) for place in places)
+    if ours > 0 and theirs > 0 and 1 / 20 < theirs / ours < 20:
+        return []
+    return [
+        f"frame {frame}: the render is about {theirs:.3g} m from the camera and the drawing {ours:.3g} m: "
+        "is passes.unit right?"
+    ]
+
+
 def _in_frame(frame: int, error: Exception) -> str:
-    text = " ".join(str(error).split())
+    text = describe(error)
     return text if text.startswith(f"frame {frame}:") else f"frame {frame}: {text}"

@@ -48,7 +48,7 @@ def read_drawn(shot: Shot, frame: int) -> Drawn:
     _check_size(frame, path, picture, shot.settings.shot.size)
     labels, notes = _labels(shot, frame, picture)
     try:
-        layer = matte(picture, settings.matte, labels=labels)
+        layer = matte(picture, shot.matte, labels=labels)
     except ValueError as error:
         raise ValueError(f"frame {frame}: {path}: {error}") from None
     if shot.drawing_depth is not None:
@@ -66,6 +66,8 @@ def read_drawn(shot: Shot, frame: int) -> Drawn:
         # Lines belong to the limbs that they bound before those are made opaque; faint ink is paper.
         labels = grow_labels(labels, layer.alpha > FAINT, reach=settings.reach)
         layer = matte(picture, "fill", labels=labels)
+    if not labels.any() and layer.alpha.any():
+        raise ValueError(f"frame {frame}: {path}: something is drawn, but no limb is marked in the label picture")
     grown = grow_labels(labels, layer.alpha > 0, reach=settings.reach)
     ends, end_depths = limb_ends(shot, frame, grown)
     return Drawn(

@@ -82,7 +82,7 @@ def _distinct(error: ValidationError) -> Iterator[dict[str, Any]]:
     for item in error.errors():
         place = tuple(part for part in item["loc"] if not _is_kind(part))
         if place in merged:
-            merged[place]["msg"] += f", or {item['msg']}"
+            merged[place]["msg"] += f" or {item['msg'].removeprefix('Input should be ')}"
         else:
             merged[place] = {**item, "loc": place}
     yield from merged.values()

@@ -59,6 +59,7 @@ class DrawingSection(Section):
     reach: float | None = Field(None, ge=0, allow_inf_nan=False)
     half_width: float | None = Field(None, gt=0, allow_inf_nan=False)
     threshold: int = Field(128, ge=0, le=255)
+    first_marked: int | None = None
     matte: Literal["auto", "ink", "unmix", "fill", "alpha"] = "auto"
     interpolation: Literal["linear", "perspective"] = "linear"
 

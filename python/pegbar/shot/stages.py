@@ -19,6 +19,7 @@ from pegbar.io.atomic import clean_leftovers
 from pegbar.io.exr import read_passes, write_exr
 from pegbar.io.frames import read_image, write_image
 from pegbar.layer.composite import Space, depth_composite, holdout_matte
+from pegbar.report.contact_sheet import over_paper
 from pegbar.report.depth_picture import depth_picture
 from pegbar.shot.drawn import Drawn, drawn_inputs, read_drawn
 from pegbar.shot.plan import Shot
@@ -83,7 +84,7 @@ class Stage:
         """A hash of all that decides the result besides the picture files: version, settings, this frame's marks."""
         shot = self.shot
         parts: list[Any] = [VERSION, type(self).__name__, [section.model_dump() for section in self.sections()]]
-        parts += [shot.palette.colors.tolist(), shot.palette.labels.tolist()]
+        parts += [shot.matte, shot.palette.colors.tolist(), shot.palette.labels.tolist()]
         if (marks := shot.annotations) is not None and shot.drawing_depth is None:
             index = shot.annotation_index(frame)
             depths = None if marks.depths is None else marks.depths[index].tolist()
@@ -194,7 +195,9 @@ def check_passes(frame: int, path: Path, drawn: Drawn, beauty: NDArray[Any], dep
 
 
 def _write_final(path: Path, picture: NDArray[Any]) -> None:
-    if path.suffix.lower() == ".exr":
+    if path.suffix.lower() in (".jpg", ".jpeg"):
+        write_image(path, over_paper(picture))
+    elif path.suffix.lower() == ".exr":
         write_exr(path, {name: picture[..., i] for i, name in enumerate("RGBA")})
     else:
         write_image(path, picture)

@@ -10,13 +10,13 @@ from pegbar.io.annotations import read_annotations
 from pegbar.io.frames import read_picture
 from pegbar.io.numbers import format_frames
 from pegbar.io.sequence import FrameSequence, find_sequences
+from pegbar.shot.record import FOLDER as RECORDS
 
-# Which folder or file names say what a sequence holds; the first that fits counts, plain drawings come last.
+# Which words in folder or file names say what a sequence holds; the first that fits counts, plain drawings come last.
 _KINDS = {
-    "made by pegbar": r"(^|/)(final|holdout)(/|\.)|^depth/depth\.",
-    "beauty": r"beauty|passes|render|rgba",
-    "depth": r"depth|(^|/)z\.",
-    "labels": r"label|(^|/)seg|mask|limb|colou?r",
+    "depth": r"\b(z?depth|z)\b",
+    "beauty": r"\b(beauty|pass(es)?|renders?|rgba)\b",
+    "labels": r"\b(labels?|seg|segmentation|masks?|limbs?|colou?rs?)\b",
 }
 _EXAMPLES = {
     "labels": "labels/labels.####.png",
@@ -26,22 +26,29 @@ _EXAMPLES = {
 }
 
 
-def start_shot(folder: Path) -> str:
+def start_shot(folder: Path, drawings: str | None = None) -> str:
     """Return the text of a shot file for the drawn frames in ``folder`` and the folders below it.
 
-    Raises MissingFrameError where there is no picture sequence, and ValueError where several could be the drawings.
+    ``drawings`` names their sequence where it cannot be told. Raises MissingFrameError where there is no picture
+    sequence, and ValueError where several could be the drawings.
     """
+    folder = folder.absolute()
     annotations = _annotations(folder)
     named = _named_by(annotations)
     found: dict[str, list[FrameSequence]] = {"drawings": [], **{kind: [] for kind in _KINDS}}
+    chosen = FrameSequence.parse(folder / drawings) if drawings else None
     for sequence in find_sequences(folder):
+        if (sequence.folder / RECORDS).is_dir() or _is(sequence, chosen):
+            continue
         first = sequence.path(sequence.numbers[0]).absolute()
         found[named.get(first) or _kind(sequence, folder)].append(sequence)
-    if not found["drawings"]:
+    if chosen is not None:
+        found["drawings"] = [chosen]
+    if not found["drawings"] or not found["drawings"][0].numbers:
         raise MissingFrameError(f"{folder}: no sequence of drawn frames (numbered pictures) here")
     if len(found["drawings"]) > 1:
         names = ", ".join(_relative(sequence, folder) for sequence in found["drawings"])
-        raise ValueError(f"{folder}: several sequences could be the drawings: {names}; move the others or rename them")
+        raise ValueError(f"{folder}: several sequences could be the drawings: {names}; choose with --drawings")
     return _text(folder, found["drawings"][0], found, annotations)
 
 
@@ -67,8 +74,12 @@ def _named_by(annotations: Path | None) -> dict[Path, str]:
     }
 
 
+def _is(sequence: FrameSequence, chosen: FrameSequence | None) -> bool:
+    return chosen is not None and sequence.path(sequence.numbers[0]) == chosen.path(sequence.numbers[0])
+
+
 def _kind(sequence: FrameSequence, folder: Path) -> str:
-    name = _relative(sequence, folder).lower()
+    name = _relative(sequence, folder).lower().replace("_", " ")
     for kind, words in _KINDS.items():
         if re.search(words, name):
             return kind
@@ -76,7 +87,7 @@ def _kind(sequence: FrameSequence, folder: Path) -> str:
 
 
 def _relative(sequence: FrameSequence, folder: Path) -> str:
-    return Path(sequence.pattern).absolute().relative_to(folder.absolute()).as_posix()
+    return Path(sequence.pattern).absolute().relative_to(folder).as_posix()
 
 
 def _text(
@@ -86,9 +97,11 @@ def _text(
     values = {kind: _relative(found[kind][0], folder) for kind in ("labels", "beauty", "depth") if found[kind]}
     if annotations is not None:
         values["annotations"] = annotations.name
+    taken = {Path(value).parent.as_posix() for value in values.values()}
+    own = "depth" if "depth" not in taken else "drawing_depth"
     return f"""\
 [shot]
-name = {_quoted(folder.absolute().name)}
+name = {_quoted(folder.name)}
 frames = "{format_frames(drawings.numbers).replace(" ", "")}"
 frame_rate = 24
 size = [{width}, {height}]
@@ -98,6 +111,11 @@ frames = {_quoted(_relative(drawings, folder))}
 {_line("labels", values)}
 {_line("annotations", values)}
 matte = "auto"               # auto, ink, unmix, fill or alpha
+# hold = 2                   # each drawing is shown for two frames
+# tolerance = 30             # limb colours that are scanned or antialiased
+
+# [drawing.palette]          # further colours and the limbs that they belong to
+# "#8a4b2a" = "head"
 
 {"" if "beauty" in values else "# "}[passes]
 {_line("beauty", values)}
@@ -105,7 +123,9 @@ matte = "auto"               # auto, ink, unmix, fill or alpha
 
 [output]
 frames = "final/final.####.png"
-depth = "depth/depth.####.exr"
+depth = "{own}/depth.####.exr"
+depth_picture = "{own}/depth.####.png"
+# holdout = "holdout/holdout.####.png"   # the matte that holds the render out, for Nuke or Natron
 """
 
 

@@ -1,0 +1,108 @@
+"""Finds what a shot file names: sequences, outputs that harm nothing, and which marks belong to which drawing."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TypeVar
+
+from pegbar.errors import describe
+from pegbar.io.frames import PICTURE_SUFFIXES
+from pegbar.io.numbers import format_frames
+from pegbar.io.sequence import FrameSequence
+from pegbar.scene.drawing import Drawing
+from pegbar.shot.model import DrawingSection
+
+T = TypeVar("T")
+OUTPUT_SUFFIXES: dict[str, tuple[str, ...]] = {
+    "frames": PICTURE_SUFFIXES,
+    "depth": (".exr",),
+    "depth_picture": (".png",),
+    "holdout": (".png", ".tif", ".tiff"),
+}
+
+
+class KeyedError(ValueError):
+    """A wrong value under a key of its own."""
+
+    def __init__(self, key: tuple[str, ...], problem: str) -> None:
+        self.key = key
+        super().__init__(problem)
+
+
+@dataclass
+class Problems:
+    """Collects what is wrong, each with its place in the shot file ``source``."""
+
+    source: str
+    lines: Mapping[tuple[str, ...], int]
+    found: list[str] = field(default_factory=list)
+
+    def call(self, key: str, function: Callable[..., T], *arguments: object) -> T | None:
+        """Return what ``function`` returns, or None and note why it did not."""
+        try:
+            return function(*arguments)
+        except (ValueError, OSError) as error:
+            path = getattr(error, "key", ()) or tuple(key.split("."))
+            line = self.lines.get(path)
+            place = f"{self.source}:{line}" if line else self.source
+            self.found.append(f"{place}: {'.'.join(path)}: {describe(error)}")
+            return None
+
+
+def find_input(folder: Path, pattern: str | None) -> FrameSequence | None:
+    """Return the sequence of files that ``pattern`` names, None for no pattern; FileNotFoundError for no file."""
+    if not pattern:
+        return None
+    sequence = FrameSequence.parse(str(folder / pattern))
+    if not sequence.numbers:
+        raise FileNotFoundError(f"no such file: {folder / pattern}")
+    return sequence
+
+
+def plan_output(folder: Path, key: str, pattern: str) -> FrameSequence:
+    """Return the sequence that output ``key`` is written to; ValueError for a pattern that cannot hold it."""
+    suffixes = OUTPUT_SUFFIXES[key]
+    if Path(pattern).suffix.lower() not in suffixes:
+        raise ValueError(f'want a name that ends in {", ".join(suffixes)}, got "{pattern}"')
+    if not re.search(r"#|@|%0?\d*d", Path(pattern).name):
+        raise ValueError(f'want a pattern with a frame number, like "final.####.png", got "{pattern}"')
+    # Files that are there already must not decide how new frames are called.
+    sequence = FrameSequence.parse(folder / pattern)
+    return FrameSequence(sequence.folder, sequence.prefix, sequence.suffix, sequence.padding, ())
+
+
+def check_clash(output: FrameSequence, others: Mapping[str, FrameSequence | None]) -> None:
+    """Refuse an output whose files are those of one of ``others``: nothing that was given is ever replaced."""
+    for name, other in others.items():
+        if other is not None and _files(output) == _files(other):
+            raise ValueError(f"{output.pattern} is also {name}: writing would replace it")
+
+
+def _files(sequence: FrameSequence) -> tuple[Path, str, str]:
+    return sequence.folder.resolve(), sequence.prefix, sequence.suffix
+
+
+def match_marks(annotations: Drawing, drawings: FrameSequence, settings: DrawingSection) -> dict[int, int]:
+    """Return which frame of the annotations belongs to each drawing number.
+
+    By file name where the annotations name pictures of the sequence; else from ``first_marked`` on; else in order,
+    which needs as many annotated frames as there are drawings, missing ones counted.
+    """
+    count, numbers = len(annotations.markers), drawings.numbers
+    named = {path.name: index for index, path in enumerate(annotations.images)}
+    by_name = {number: named[drawings.path(number).name] for number in numbers if drawings.path(number).name in named}
+    if by_name:
+        return by_name
+    if settings.first_marked is not None:
+        return {settings.first_marked + index: index for index in range(count)}
+    if settings.hold == "sparse" and len(numbers) == count:
+        return {number: index for index, number in enumerate(numbers)}
+    if settings.hold != "sparse" and numbers[-1] - numbers[0] + 1 == count:
+        return {numbers[0] + index: index for index in range(count)}
+    raise ValueError(
+        f"{count} frames are marked, the drawings are {format_frames(numbers)}: name the pictures in the annotations, "
+        "or say with drawing.first_marked which drawing the first marks belong to"
+    )
