@@ -40,6 +40,15 @@ def test_python_in_the_guide_runs(page):
         assert set(re.findall(r"^(?:.*&& )?(?:\.venv/bin/)?pegbar ([a-z]+)", block, re.MULTILINE)) <= set(COMMANDS)
 
 
+def test_the_annotation_in_the_guide_is_one(tmp_path):
+    page = (ROOT / "docs" / "compositing.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"```json\n(.*?)```", page, re.DOTALL)
+    (tmp_path / "a.json").write_text(block)
+    drawing = pegbar.read_annotations(tmp_path / "a.json")
+    assert drawing.depths.shape == (1, 5)
+    assert len(drawing.limbs) == 3
+
+
 def test_links_in_the_guide_lead_somewhere():
     for page in PAGES:
         for link in re.findall(r"\]\(([^)#]+)", page.read_text(encoding="utf-8")):
