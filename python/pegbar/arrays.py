@@ -23,7 +23,7 @@ def floats(
 
     ``allow`` is "finite", "nan" (missing values may be NaN) or "any" (the kernel checks the values itself).
     """
-    array = _plain(name, value)
+    array = _plain(name, value, shape)
     if array.dtype.kind not in "fiu":
         raise ValueError(f"{name}: want real numbers, got dtype {array.dtype}")
     _check_shape(name, array, shape)
@@ -47,7 +47,7 @@ def integers(
     high: int | None = None,
 ) -> NDArray[Any]:
     """Return ``value`` as a C-contiguous integer array of ``dtype``; every value must lie in ``low``..``high``."""
-    array = _plain(name, value)
+    array = _plain(name, value, shape)
     if array.dtype.kind not in "iu" and array.size:
         raise ValueError(f"{name}: want integers, got dtype {array.dtype}")
     _check_shape(name, array, shape)
@@ -62,7 +62,7 @@ def integers(
 
 def flags(name: str, value: ArrayLike, shape: Shape) -> NDArray[np.bool_]:
     """Return ``value`` as a C-contiguous boolean array."""
-    array = _plain(name, value)
+    array = _plain(name, value, shape)
     if array.dtype.kind != "b":
         raise ValueError(f"{name}: want true or false values, got dtype {array.dtype}")
     _check_shape(name, array, shape)
@@ -80,11 +80,15 @@ def same_size(name: str, array: NDArray[Any], other: str, size: tuple[int, ...])
         raise ValueError(f"{name}: want {size[0]} rows x {size[1]} columns as {other}, got shape {array.shape}")
 
 
-def _plain(name: str, value: ArrayLike) -> NDArray[Any]:
+def _plain(name: str, value: ArrayLike, shape: Shape) -> NDArray[Any]:
     try:
-        return np.asarray(value)
+        array = np.asarray(value)
     except (ValueError, TypeError) as error:
         raise ValueError(f"{name}: not an array: {error}") from None
+    sizes = [size for size in shape[1:] if isinstance(size, int)]
+    if array.shape == (0,) and len(sizes) == len(shape) - 1:
+        return array.reshape(0, *sizes)  # an empty list has no other axes
+    return array
 
 
 def _check_shape(name: str, array: NDArray[Any], shape: Shape) -> None:

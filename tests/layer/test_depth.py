@@ -78,3 +78,7 @@ def test_perspective_refuses_a_depth_at_or_behind_the_camera():
         limb_depth([[1]], [[[0, 0], [1, 1]]] * 2, [[1, 2], [0, 2]], interpolation="perspective")
     with pytest.raises(ValueError, match="interpolation"):
         limb_depth([[1]], [[[0, 0], [1, 1]]], [[1, 2]], interpolation="cubic")
+
+
+def test_no_limb_is_legal():
+    assert np.isinf(limb_depth([[0, 0]], [], [])).all()
