@@ -12,6 +12,7 @@ from .layer.depth import limb_depth as limb_depth
 from .layer.matte import Matte as Matte
 from .layer.matte import ink_alpha as ink_alpha
 from .layer.matte import matte as matte
+from .layer.rim import rim_depth as rim_depth
 from .layer.segmentation import LabelMap as LabelMap
 from .layer.segmentation import grow_labels as grow_labels
 from .layer.segmentation import palette_labels as palette_labels

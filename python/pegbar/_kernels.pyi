@@ -18,6 +18,7 @@ __all__ = [
     "palette_labels",
     "render_passes",
     "resolve_passes",
+    "rim_depth",
     "segment_stick_figure",
     "stroke_polyline",
     "unpremultiply",
@@ -84,3 +85,4 @@ def composite_matte(
     rendered_depth: NDArray[np.float32],
     scale: int,
 ) -> NDArray[np.float32]: ...
+def rim_depth(rendered: NDArray[Any], rendered_depth: NDArray[np.float32]) -> NDArray[np.float32] | None: ...

@@ -74,6 +74,14 @@ def image(name: str, value: ArrayLike, channels: tuple[int, ...] = (3, 4)) -> ND
     return integers(name, value, ("H", "W", channels), dtype=np.uint8)
 
 
+def samples(name: str, value: ArrayLike) -> NDArray[Any]:
+    """Return ``value`` as C-contiguous (H, W, 4) samples of a render: integers as uint8, floats as float32."""
+    array = _plain(name, value, ("H", "W", 4))
+    if array.dtype.kind == "f":
+        return floats(name, array, ("H", "W", 4), dtype=np.float32, allow="any")
+    return image(name, array, (4,))
+
+
 def same_size(name: str, array: NDArray[Any], other: str, size: tuple[int, ...]) -> None:
     """Refuse ``array`` unless its rows and columns are ``size``, the rows and columns of argument ``other``."""
     if array.shape[:2] != size[:2]:

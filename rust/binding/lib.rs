@@ -11,6 +11,7 @@ mod matte;
 mod paint;
 mod palette;
 mod raster;
+mod rim;
 mod segment;
 
 use pyo3::prelude::*;
@@ -36,6 +37,8 @@ mod _kernels {
     use crate::palette::palette_labels;
     #[pymodule_export]
     use crate::raster::{render_passes, resolve_passes};
+    #[pymodule_export]
+    use crate::rim::rim_depth;
     #[pymodule_export]
     use crate::segment::segment_stick_figure;
 }

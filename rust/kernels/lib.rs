@@ -17,6 +17,7 @@ pub mod paint;
 pub mod palette;
 pub mod raster;
 pub mod resolve;
+pub mod rim;
 pub mod segment;
 mod settle;
 pub mod shade;

@@ -186,6 +186,20 @@ def test_larger_passes_separate_depth_and_units(shot, monkeypatch):
     assert np.array_equal(read_image("big/o.0003.png"), want)
 
 
+def test_a_renders_soft_edge_without_depth_covers_the_far_limb_and_not_the_near_one(shot, monkeypatch):
+    monkeypatch.chdir(shot.parent)
+    passes = bar()
+    passes[""][11] = (0.5, 0, 0, 0.5)
+    for frame in (1, 2, 3, 4):
+        write_exr(f"p.{frame:04d}.exr", passes)
+    assert run("composite", shot, "--holdout", "hold/h.####.png") == 0
+    final, holdout = (read_image(name) for name in ("final/f.0001.png", "hold/h.0001.png"))
+    assert (final[11, 6:20] == (228, 75, 50, 255)).all()
+    assert (final[11, 30:44] == (90, 160, 90, 255)).all()
+    assert (holdout[11, 6:20] == 0).all()
+    assert (holdout[11, 30:44] == 255).all()
+
+
 def test_linear_light_stays_linear_in_exr(shot, monkeypatch):
     monkeypatch.chdir(shot.parent)
     assert run("composite", shot, "--output", "final/f.####.exr") == 0

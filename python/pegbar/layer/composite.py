@@ -79,7 +79,7 @@ def depth_composite(
     size = drawing.shape[:2]
     alpha = arrays.floats("alpha", alpha, size, dtype=np.float32, allow="any")
     drawing_depth = arrays.floats("drawing_depth", drawing_depth, size, dtype=np.float32, allow="any")
-    rendered = _samples(rendered)
+    rendered = arrays.samples("rendered", rendered)
     scale = _scale("rendered", rendered, size)
     rendered_depth = arrays.floats("rendered_depth", rendered_depth, ("H", "W"), dtype=np.float32, allow="any")
     arrays.same_size("rendered_depth", rendered_depth, "rendered", rendered.shape)
@@ -178,16 +178,6 @@ def _matte(
     if rendered_alpha is not None:
         arrays.same_size("rendered_alpha", rendered_alpha, "rendered_depth", rendered_depth.shape)
     return _kernels.composite_matte(alpha, drawing_depth, rendered_alpha, rendered_depth, scale)
-
-
-def _samples(rendered: ArrayLike) -> NDArray[Any]:
-    try:
-        kind = np.asarray(rendered).dtype.kind
-    except (ValueError, TypeError) as error:
-        raise ValueError(f"rendered: not an array: {error}") from None
-    if kind == "f":
-        return arrays.floats("rendered", rendered, ("H", "W", 4), dtype=np.float32, allow="any")
-    return arrays.image("rendered", rendered, (4,))
 
 
 def _scale(name: str, rendered: NDArray[Any], size: tuple[int, ...]) -> int:

@@ -19,13 +19,14 @@ from pegbar.io.atomic import clean_leftovers
 from pegbar.io.exr import read_passes, write_exr
 from pegbar.io.frames import read_image, write_image
 from pegbar.layer.composite import Space, depth_composite, holdout_matte
+from pegbar.layer.rim import rim_depth
 from pegbar.report.contact_sheet import over_paper
 from pegbar.report.depth_picture import depth_picture
 from pegbar.shot.drawn import Drawn, drawn_inputs, read_drawn
 from pegbar.shot.plan import Shot
 from pegbar.shot.record import fingerprint, is_up_to_date, write_record
 
-VERSION = 1
+VERSION = 2
 
 
 @dataclass(frozen=True)
@@ -141,6 +142,7 @@ class CompositeStage(Stage):
         drawn = read_drawn(self.shot, frame)
         beauty, depth, space = self.read_rendered(frame)
         check_passes(frame, self.inputs(frame)[-1], drawn, beauty, depth)
+        depth = rim_depth(beauty, depth)
         target = self.shot.settings.output.composite_space
         final, *holdout = self.outputs(frame)
         picture = depth_composite(
