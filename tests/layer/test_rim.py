@@ -49,7 +49,7 @@ def test_memory_order_and_kind_of_input_do_not_matter(seed, size, kind):
 
 @pytest.mark.parametrize("value", [np.inf, 2.0])
 def test_the_given_array_is_returned_where_nothing_is_to_be_filled(value):
-    rendered = np.full((6, 130, 4), 255, np.uint8)
+    rendered = np.full((6, 130, 4), 128, np.uint8)
     for depth in (np.full((6, 130), value, np.float32), np.full((130, 6), value, np.float32).T):
         assert rim_depth(rendered, depth) is depth
     depth = np.full((6, 130), np.inf, np.float32)
