@@ -42,7 +42,7 @@ pub fn rim(pixels: Rendered, depth: &[f32], width: usize) -> Result<Vec<Rim>, Ke
     if depth.is_empty() {
         return Ok(Vec::new());
     }
-    if width == 0 || depth.len() % width != 0 {
+    if !depth.len().is_multiple_of(width) {
         return Err(KernelError::Argument { argument: "rendered_depth", problem: "want whole rows" });
     }
     let map = Map::new(depth, width);
@@ -141,13 +141,15 @@ fn candidates(depth: &[f32], width: usize, row: usize, first: usize) -> u64 {
     let mut nothing = [0u32; BLOCK];
     let own = &depth[row * width..][first..(first + BLOCK).min(width)];
     nothing.iter_mut().zip(own).for_each(|(nothing, z)| *nothing = u32::from(*z == f32::INFINITY));
-    for (i, nothing) in nothing.iter_mut().enumerate() {
-        *nothing &= some[i..=i + 2 * REACH].iter().fold(0, |all, some| all | some);
+    let mut near = [0u32; BLOCK];
+    for shift in 0..=2 * REACH {
+        near.iter_mut().zip(&some[shift..]).for_each(|(near, some)| *near |= some);
     }
-    if nothing == [0; BLOCK] {
+    near.iter_mut().zip(&nothing).for_each(|(near, nothing)| *near &= nothing);
+    if near.iter().fold(0, |all, near| all | near) == 0 {
         return 0;
     }
-    nothing.iter().rev().fold(0, |bits, bit| bits << 1 | u64::from(*bit))
+    near.iter().enumerate().fold(0, |bits, (i, near)| bits | u64::from(*near) << i)
 }
 
 /// Flags the blocks of one row.
