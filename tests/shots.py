@@ -32,8 +32,9 @@ depth_picture = "depth/z.####.png"
 def make_shot(folder, count=4, extra=""):
     """Write the shot into ``folder`` and return the path of its shot file.
 
-    Frame f: the body (far) fills columns 4..19, the arm (near) columns 28..43, both shifted by f; the bar, rows
-    12..19, is rendered in the middle depth across the whole picture, so it covers the body and not the arm.
+    Frame f: the body (far) fills columns 4..19, the arm (near) columns 28..43, both shifted by f (by 1 again from
+    frame 5 on, and so forth); the bar, rows 12..19, is rendered in the middle depth across the whole picture, so it
+    covers the body and not the arm.
     """
     folder.mkdir(parents=True, exist_ok=True)
     markers = []
@@ -66,6 +67,7 @@ def move_mark(shot, frame, name, place):
 
 def draw(frame):
     """Return the drawing (RGBA, a soft line round each limb), its labels, and the marks."""
+    frame = (frame - 1) % 4 + 1
     drawing = np.zeros((HEIGHT, WIDTH, 4), np.uint8)
     labels = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
     for left, color, paint in ((4 + frame, BODY, (200, 150, 100)), (28 + frame, ARM, (90, 160, 90))):
