@@ -1,5 +1,7 @@
 """Slow numpy transcriptions of the mattes (2010 paper, equations 14 and 15, and docs/papers.md)."""
 
+from fractions import Fraction
+
 import numpy as np
 
 
@@ -10,6 +12,14 @@ def over_white(image):
         return image
     alpha = image[..., 3:] / 255
     return image[..., :3] * alpha + 255 * (1 - alpha)
+
+
+def whiten(image, white_point):
+    """Levels from the white point up are white, those below spread over the range; an alpha channel stays."""
+    image = np.array(image)
+    table = [min(255, int(255 * Fraction(v, white_point) + Fraction(1, 2))) for v in range(256)]
+    image[..., :3] = np.array(table, np.uint8)[image[..., :3]]
+    return image
 
 
 def ink_alpha(image):

@@ -48,7 +48,7 @@ def read_drawn(shot: Shot, frame: int) -> Drawn:
     _check_size(frame, path, picture, shot.settings.shot.size)
     labels, notes = _labels(shot, frame, picture)
     try:
-        layer = matte(picture, settings.matte, labels=labels)
+        layer = matte(picture, settings.matte, labels=labels, white_point=settings.white_point)
     except ValueError as error:
         raise ValueError(f"frame {frame}: {path}: {error}") from None
     if shot.drawing_depth is not None:
@@ -65,7 +65,7 @@ def read_drawn(shot: Shot, frame: int) -> Drawn:
     if layer.mode == "fill":
         # Lines belong to the limbs that they bound before those are made opaque; faint ink is paper.
         labels = grow_labels(labels, layer.alpha > FAINT, reach=settings.reach)
-        layer = matte(picture, "fill", labels=labels)
+        layer = matte(picture, "fill", labels=labels, white_point=settings.white_point)
     grown = grow_labels(labels, layer.alpha > 0, reach=settings.reach)
     ends, end_depths = limb_ends(shot, frame, grown)
     return Drawn(

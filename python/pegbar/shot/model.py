@@ -60,6 +60,7 @@ class DrawingSection(Section):
     half_width: float | None = Field(None, gt=0, allow_inf_nan=False)
     threshold: int = Field(128, ge=0, le=255)
     matte: Literal["auto", "ink", "unmix", "fill", "alpha"] = "auto"
+    white_point: int = Field(255, ge=1, le=255)
     interpolation: Literal["linear", "perspective"] = "linear"
 
     @property
