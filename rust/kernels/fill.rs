@@ -2,8 +2,10 @@
 //!
 //! After Jain, Sheikh, Mahler, Hodgins 2010, equations 14 and 15, whose darkness turns a light skin into glass. The
 //! limbs' border pixels are part paint and part paper: opaque, they would carry a rim of paper onto any other plate. So a
-//! border pixel takes the least-mixed explanation from its neighbours farther in: the one whose colour, laid over white
-//! with some alpha, comes nearest to it. Assumes white paper; colours as stored, without gamma.
+//! border pixel takes its explanation from the paint farther in and from the ink of the outline: the one whose colour, laid
+//! over white with some alpha, comes nearest to it, and of ink that comes about as near the darkest. For the grey beside a thin
+//! line may be light paint or half-covered black, and light paint would carry the paper along. Assumes white paper; colours
+//! as stored, without gamma.
 
 use crate::error::{KernelError, check_length};
 use crate::matte::{BLOCK, OPACITY, over_white, shade, unmix, without_white};
@@ -11,6 +13,18 @@ use rayon::prelude::*;
 
 /// How far inside the paint of a border pixel is looked for.
 const INWARD: usize = 2;
+
+/// How far along the outline its ink is looked for.
+const ALONG: usize = 4;
+
+/// Ink is at least this far from white in every channel.
+const INK: u8 = 128;
+
+/// Squared distance in 8-bit RGB within which ink explains a pixel as well as the best does.
+const CLOSE: i32 = 6 * 6;
+
+/// Squared distance in 8-bit RGB below which a pixel is one flat paint with the next one farther in.
+const FLAT: i32 = 5 * 5;
 
 /// Squared distance in 8-bit RGB: paint nearer to white than this tells nothing of alpha, and paint over white that comes
 /// no nearer to a pixel does not explain it.
@@ -109,7 +123,7 @@ fn depth_row(labels: &[u8], row: usize, around: &mut [u8], out: &mut [u8]) {
     }
 }
 
-/// Paint and alpha of a border pixel, from the paint farther in that explains it best; opaque where none does.
+/// Paint and alpha of a border pixel, from the paint that explains it; opaque where none does.
 fn border<const C: usize>(
     pixels: &[[u8; C]],
     width: usize,
@@ -118,22 +132,87 @@ fn border<const C: usize>(
     drawn: [u8; 3],
 ) -> ([u8; 3], f32) {
     let own = depths[row * width + column];
-    let columns = column.saturating_sub(INWARD)..(column + INWARD + 1).min(width);
-    let rows = row.saturating_sub(INWARD)..(row + INWARD + 1).min(depths.len() / width);
-    let deeper = rows.flat_map(|y| columns.clone().map(move |x| (y, x))).filter(|(y, x)| depths[y * width + x] > own);
-    let explained = deeper.filter_map(|(y, x)| {
-        let away = y.abs_diff(row).pow(2) + x.abs_diff(column).pow(2);
-        let (miss, alpha) = explain(drawn, over_white(&pixels[y * width + x]))?;
-        Some((miss, away, alpha))
-    });
-    // Equally good ones: the nearest, then the more opaque.
-    match explained.min_by_key(|(miss, away, alpha)| (*miss, *away, u8::MAX - alpha)) {
-        None => (drawn, 1.0),
-        Some((_, _, alpha)) => {
-            let alpha = alpha.max(u8::MAX - drawn[0].min(drawn[1]).min(drawn[2]));
-            (without_white(drawn, alpha), OPACITY[usize::from(alpha)])
+    let outward = outward(depths, width, [row, column]);
+    if own == depth::CORNER && has_darker_outward(pixels, width, [row, column], outward, drawn) {
+        return (drawn, 1.0);
+    }
+    let (mut flat, mut paint, mut any, mut ink) = (false, NOTHING, NOTHING, u8::MAX);
+    for [y, x] in around([row, column], ALONG, [depths.len() / width, width]) {
+        let [down, right] = [y as i32 - row as i32, x as i32 - column as i32];
+        let farther_in = depths[y * width + x] > own && down.abs().max(right.abs()) <= INWARD as i32;
+        let along = matches!(depths[y * width + x], depth::SIDE | depth::CORNER)
+            && [y, x] != [row, column]
+            && down * outward[0] + right * outward[1] <= 0;
+        if !farther_in && !along {
+            continue;
+        }
+        let color = over_white(&pixels[y * width + x]);
+        let is_ink = lightest(color) <= u8::MAX - INK;
+        if !farther_in && !is_ink {
+            continue;
+        }
+        if let Some(found) = explain(drawn, color) {
+            any = any.min(found);
+            if farther_in {
+                paint = paint.min(found);
+                flat |= down.abs() + right.abs() == 1 && apart(drawn, color) < FLAT;
+            }
+            if is_ink && found.0 <= CLOSE {
+                ink = ink.min(found.1);
+            }
         }
     }
+    let alpha = if flat { paint.1 } else { any.1.min(ink) };
+    let alpha = alpha.max(u8::MAX - darkest(drawn));
+    (without_white(drawn, alpha), OPACITY[usize::from(alpha)])
+}
+
+/// What explains a pixel that nothing explains: by no means, and opaque.
+const NOTHING: (i32, u8) = (i32::MAX, u8::MAX);
+
+/// The pixels of a picture of `size` within `reach` of one in rows and columns.
+fn around([row, column]: [usize; 2], reach: usize, size: [usize; 2]) -> impl Iterator<Item = [usize; 2]> {
+    let near = |at: usize, end: usize| at.saturating_sub(reach)..(at + reach + 1).min(end);
+    let columns = near(column, size[1]);
+    near(row, size[0]).flat_map(move |y| columns.clone().map(move |x| [y, x]))
+}
+
+/// Where the outside lies: the steps to the outside neighbours, added up.
+fn outward(depths: &[u8], width: usize, [row, column]: [usize; 2]) -> [i32; 2] {
+    let near = around([row, column], 1, [depths.len() / width, width]);
+    near.filter(|[y, x]| depths[y * width + x] == depth::OUTSIDE)
+        .fold([0, 0], |[down, right], [y, x]| [down + y as i32 - row as i32, right + x as i32 - column as i32])
+}
+
+/// Whether a line runs between a pixel and the outside: a side neighbour on that side is darker.
+fn has_darker_outward<const C: usize>(
+    pixels: &[[u8; C]],
+    width: usize,
+    at: [usize; 2],
+    outward: [i32; 2],
+    drawn: [u8; 3],
+) -> bool {
+    around(at, 1, [pixels.len() / width, width]).any(|[y, x]| {
+        let [down, right] = [y as i32 - at[0] as i32, x as i32 - at[1] as i32];
+        down.abs() + right.abs() == 1
+            && down * outward[0] + right * outward[1] > 0
+            && darkest(over_white(&pixels[y * width + x])) < darkest(drawn)
+    })
+}
+
+/// The least of the channels.
+fn darkest([r, g, b]: [u8; 3]) -> u8 {
+    r.min(g).min(b)
+}
+
+/// The greatest of the channels.
+fn lightest([r, g, b]: [u8; 3]) -> u8 {
+    r.max(g).max(b)
+}
+
+/// Squared distance of two colours.
+fn apart(a: [u8; 3], b: [u8; 3]) -> i32 {
+    (0..3).map(|i| (i32::from(a[i]) - i32::from(b[i])).pow(2)).sum()
 }
 
 /// The alpha with which `paint` over white comes nearest to `drawn`, and by how much it misses it (squared).
@@ -183,6 +262,31 @@ mod tests {
             let (color, alpha) = fill(paint, &[255; 4], &[1, 1, 1, 0]);
             assert_eq!((&color[..3], &alpha[..3]), (&[paint; 3][..], &[1.0; 3][..]));
         }
+    }
+
+    #[test]
+    fn grey_beside_an_outline_is_half_covered_ink_and_not_light_paint() {
+        // Below, the outline is black; above, the line is thin, and the grey farther in would explain the border too.
+        let row = |line: u8| [SKIN, SKIN, [130; 3], [line; 3], [255; 3]];
+        let image = [row(120), row(120), row(0)].concat();
+        let (mut color, mut alpha) = ([0; 45], [9.0; 15]);
+        assert_eq!(
+            fill_matte(image.as_flattened(), 3, 5, &[[1, 1, 1, 1, 0]; 3].concat(), &mut color, &mut alpha),
+            Ok(())
+        );
+        assert_eq!((alpha[2], alpha[13]), (1.0, 1.0));
+        assert_eq!((alpha[3], &color[9..12]), (OPACITY[135], &[0; 3][..]));
+    }
+
+    #[test]
+    fn paint_behind_the_corner_of_an_outline_is_opaque() {
+        let image = [[[255; 3], [20; 3], [0; 3]], [[20; 3], [110; 3], [0; 3]], [[0; 3], [0; 3], [0; 3]]].concat();
+        let (mut color, mut alpha) = ([0; 27], [9.0; 9]);
+        assert_eq!(
+            fill_matte(image.as_flattened(), 3, 3, &[0, 1, 1, 1, 1, 1, 1, 1, 1], &mut color, &mut alpha),
+            Ok(())
+        );
+        assert_eq!((alpha[4], &color[12..15]), (1.0, &[110; 3][..]));
     }
 
     #[test]

@@ -83,6 +83,28 @@ def test_auto_takes_alpha_then_labels_then_unmix():
     assert matte(image, labels=labels).mode == "alpha"
 
 
+@given(pictures(), st.sampled_from(["ink", "unmix", "fill"]), st.integers(1, 255))
+def test_the_white_point_spreads_the_levels_before_the_matte(image, mode, white_point):
+    labels = image[..., 0] % 3
+    got = matte(image, mode, labels=labels, white_point=white_point)
+    want = matte(oracle.whiten(image, white_point), mode, labels=labels)
+    assert np.array_equal(got.color, want.color)
+    assert np.array_equal(got.alpha, want.alpha)
+
+
+def test_every_level_is_spread_to_the_nearest():
+    levels = np.repeat(np.arange(256, dtype=np.uint8)[None, :, None], 3, axis=2)
+    for white_point in (1, 2, 100, 244, 254, 255):
+        got = matte(levels, "ink", white_point=white_point)
+        assert np.array_equal(got.color, oracle.whiten(levels, white_point))
+        assert np.array_equal(got.alpha == 0, np.arange(256)[None] >= white_point - 0.5 * white_point / 255)
+
+
+def test_the_white_point_leaves_the_files_own_alpha_alone():
+    image = np.full((2, 2, 4), 90, np.uint8)
+    assert np.array_equal(matte(image, white_point=100).color, image)
+
+
 @given(pictures())
 def test_memory_order_and_kind_of_input_do_not_matter(image):
     wide = np.repeat(image, 2, axis=1)[:, ::2]
@@ -106,6 +128,9 @@ IMAGE = np.zeros((2, 3, 3), np.uint8)
         ("image", lambda: ink_alpha(IMAGE.astype(int) - 1)),
         ("image", lambda: matte(IMAGE, "alpha")),
         ("mode", lambda: matte(IMAGE, "matting")),
+        ("white_point", lambda: matte(IMAGE, white_point=0)),
+        ("white_point", lambda: matte(IMAGE, white_point=256)),
+        ("white_point", lambda: matte(IMAGE, white_point=244.5)),
         ("labels", lambda: matte(IMAGE, "fill")),
         ("labels", lambda: matte(IMAGE, "fill", labels=[[1, 1]])),
         ("labels", lambda: matte(IMAGE, labels=[[1, 1, 1], [1, 1, 300]])),

@@ -1,5 +1,7 @@
 """Slow numpy transcriptions of the mattes (2010 paper, equations 14 and 15, and docs/papers.md)."""
 
+from fractions import Fraction
+
 import numpy as np
 
 
@@ -10,6 +12,14 @@ def over_white(image):
         return image
     alpha = image[..., 3:] / 255
     return image[..., :3] * alpha + 255 * (1 - alpha)
+
+
+def whiten(image, white_point):
+    """Levels from the white point up are white, those below spread over the range; an alpha channel stays."""
+    image = np.array(image)
+    table = [min(255, int(255 * Fraction(v, white_point) + Fraction(1, 2))) for v in range(256)]
+    image[..., :3] = np.array(table, np.uint8)[image[..., :3]]
+    return image
 
 
 def ink_alpha(image):
@@ -35,23 +45,45 @@ def depths(labels):
     return np.where(near[0, 0], 0, np.where(side, 1, np.where(corner, 2, 3)))
 
 
+def explain(dark, paint):
+    """By how much paint over white misses a pixel at best, and with which alpha; both as distances from white."""
+    if paint @ paint < 24**2:
+        return None
+    part = min(int(dark @ paint * 255 + paint @ paint // 2) // int(paint @ paint), 255)
+    miss = dark - (paint * part + 127) // 255
+    return (miss @ miss, part) if miss @ miss <= 24**2 else None
+
+
+def border(drawn, deep, at):
+    """The alpha of a border pixel in 255ths: the best paint farther in, or the darkest ink about as good."""
+    dark, here = 255 - drawn.astype(int), np.array(at)
+    steps = {place: np.array(place) - here for place in np.ndindex(deep.shape)}
+    near = {place: step for place, step in steps.items() if 0 < abs(step).max() <= 4}
+    outward = sum((step for place, step in near.items() if abs(step).max() == 1 and deep[place] == 0), np.zeros(2))
+    beside = [place for place, step in near.items() if abs(step).sum() == 1 and step @ outward > 0]
+    if deep[at] == 2 and any(dark[place].max() > dark[at].max() for place in beside):
+        return 255
+    paint, ink, close, flat = [], [], [], False
+    for place, step in near.items():
+        inward = deep[place] > deep[at] and abs(step).max() <= 2
+        along = deep[place] in (1, 2) and step @ outward <= 0 and dark[place].min() >= 128
+        found = explain(dark[at], dark[place]) if inward or along else None
+        if found:
+            (paint if inward else ink).append(found)
+            close += [found[1]] if dark[place].min() >= 128 and found[0] <= 36 else []
+            apart = ((dark[at] - dark[place]) ** 2).sum()
+            flat |= inward and abs(step).sum() == 1 and apart < 25
+    best = min(paint)[1] if flat else min([min(paint + ink, default=(0, 255))[1], *close])
+    return max(best, dark[at].max())
+
+
 def fill(image, labels):
-    """Alpha 1 inside, unmixed outside, the border from the paint farther in that explains it best."""
+    """Alpha 1 inside, unmixed outside, the border from the paint and the ink that explain it."""
     drawn = np.rint(over_white(image))
     color, alpha = unmix(image)
     deep = depths(labels)
     color[deep > 0], alpha[deep > 0] = drawn[deep > 0], 1
     for row, column in np.argwhere((deep == 1) | (deep == 2)):
-        dark, found = 255 - drawn[row, column], []
-        for y, x in np.ndindex(deep.shape):
-            if max(abs(y - row), abs(x - column)) <= 2 and deep[y, x] > deep[row, column]:
-                paint = 255 - drawn[y, x]
-                if paint @ paint >= 24**2:
-                    part = min(int(dark @ paint * 255 + paint @ paint // 2) // int(paint @ paint), 255)
-                    miss = dark - (paint * part + 127) // 255
-                    found.append((miss @ miss, (y - row) ** 2 + (x - column) ** 2, -part))
-        found = [best for best in found if best[0] <= 24**2]
-        if found:
-            alpha[row, column] = max(-min(found)[2], dark.max()) / 255
-            color[row, column] = 255 - dark / max(alpha[row, column], 1 / 255)
+        alpha[row, column] = border(drawn, deep, (row, column)) / 255
+        color[row, column] = 255 - (255 - drawn[row, column]) / max(alpha[row, column], 1 / 255)
     return color, alpha

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -51,7 +52,13 @@ def ink_alpha(image: ArrayLike) -> NDArray[np.float32]:
     return _kernels.ink_alpha(arrays.image("image", image))
 
 
-def matte(image: ArrayLike, mode: Mode | Literal["auto"] = "auto", *, labels: ArrayLike | None = None) -> Matte:
+def matte(
+    image: ArrayLike,
+    mode: Mode | Literal["auto"] = "auto",
+    *,
+    labels: ArrayLike | None = None,
+    white_point: int = 255,
+) -> Matte:
     """Take a drawing off its paper: colour and alpha that give the drawing back over white.
 
     Parameters
@@ -68,6 +75,9 @@ def matte(image: ArrayLike, mode: Mode | Literal["auto"] = "auto", *, labels: Ar
           "unmix".
     labels : (H, W) uint8, optional
         0 where there is no limb; needed by "fill". Labels grown over the whole figure give the cleanest rim.
+    white_point : int
+        1..255. Levels from here up are paper white, and those below are spread over the whole range: a little below the
+        darkest paper of a scan. Not used by "alpha".
 
     Returns
     -------
@@ -77,13 +87,16 @@ def matte(image: ArrayLike, mode: Mode | Literal["auto"] = "auto", *, labels: Ar
     Raises
     ------
     ValueError
-        For a wrong shape or dtype, an unknown mode, "alpha" of a picture without alpha, or "fill" without labels.
+        For a wrong shape or dtype, an unknown mode, a white point outside 1..255, "alpha" of a picture without
+        alpha, or "fill" without labels.
 
     Examples
     --------
     >>> light = matte([[[255, 191, 191]]], "unmix")
     >>> light.color, light.alpha.round(3)
     (array([[[255,   0,   0]]], dtype=uint8), array([[0.251]], dtype=float32))
+    >>> matte([[[250, 247, 244]]], "unmix", white_point=244).alpha
+    array([[0.]], dtype=float32)
     """
     image = arrays.image("image", image)
     if mode not in ("auto", "ink", "unmix", "fill", "alpha"):
@@ -91,14 +104,29 @@ def matte(image: ArrayLike, mode: Mode | Literal["auto"] = "auto", *, labels: Ar
     if labels is not None:
         labels = arrays.integers("labels", labels, ("H", "W"), dtype=np.uint8)
         arrays.same_size("labels", labels, "image", image.shape)
+    if not isinstance(white_point, (int, np.integer)) or not 1 <= white_point <= 255:
+        raise ValueError(f"white_point: want an integer from 1 to 255, got {white_point!r}")
     if mode == "auto":
         mode = "alpha" if _kernels.has_alpha(image) else "unmix" if labels is None else "fill"
     if mode == "alpha" and image.shape[2] == 3:
         raise ValueError('image: want an alpha channel for the matte "alpha", got 3 channels')
+    if mode == "alpha":
+        return Matte(image, _kernels.own_alpha(image), mode)
+    image = _whiten(image, white_point)
     if mode == "fill":
         if labels is None:
             raise ValueError('labels: want limb labels for the matte "fill", got None')
         return Matte(*_kernels.fill_matte(image, labels), mode)
-    if mode == "alpha":
-        return Matte(image, _kernels.own_alpha(image), mode)
     return Matte(*_kernels.matte(image, mode), mode)
+
+
+def _whiten(image: NDArray[np.uint8], white_point: int) -> NDArray[np.uint8]:
+    """Spread the levels below the white point over 0..255; an alpha channel stays as it is."""
+    if white_point == 255 or not image.size:
+        return image
+    levels = np.arange(256)
+    # To the nearest, halves up, in whole numbers.
+    spread = np.minimum(255, (2 * 255 * levels + white_point) // (2 * white_point))
+    table = np.repeat(spread[:, None], image.shape[2], axis=1)
+    table[:, 3:] = levels[:, None]
+    return np.asarray(cv2.LUT(image, table[None].astype(np.uint8)), np.uint8)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,6 +19,9 @@ from pegbar.shot.plan import Shot
 
 # Coverage below which ink is taken for the grain of the paper: 25 levels of 255, where scans and JPEG stay within 15.
 FAINT = 0.1
+
+# How much lighter than the ink on both sides paper is that shows between them, in 8-bit levels.
+SLIT = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +52,7 @@ def read_drawn(shot: Shot, frame: int) -> Drawn:
     _check_size(frame, path, picture, shot.settings.shot.size)
     labels, notes = _labels(shot, frame, picture)
     try:
-        layer = matte(picture, shot.matte, labels=labels)
+        layer = matte(picture, shot.matte, labels=labels, white_point=settings.white_point)
     except ValueError as error:
         raise ValueError(f"frame {frame}: {path}: {error}") from None
     if shot.drawing_depth is not None:
@@ -63,9 +67,10 @@ def read_drawn(shot: Shot, frame: int) -> Drawn:
             "figure) or drawing.depth"
         )
     if layer.mode == "fill":
-        # Lines belong to the limbs that they bound before those are made opaque; faint ink is paper.
-        labels = grow_labels(labels, layer.alpha > FAINT, reach=settings.reach)
-        layer = matte(picture, "fill", labels=labels)
+        # Lines belong to the limbs that they bound before those are made opaque; faint ink and slits are paper.
+        ink = matte(picture, "unmix", white_point=settings.white_point).alpha
+        labels = grow_labels(labels, (ink > FAINT) & ~_slits(ink), reach=settings.reach)
+        layer = matte(picture, "fill", labels=labels, white_point=settings.white_point)
     if not labels.any() and layer.alpha.any():
         raise ValueError(f"frame {frame}: {path}: something is drawn, but no limb is marked in the label picture")
     grown = grow_labels(labels, layer.alpha > 0, reach=settings.reach)
@@ -94,6 +99,19 @@ def limb_ends(shot: Shot, frame: int, labels: NDArray[np.uint8]) -> tuple[NDArra
             name = marks.limbs[limb].name
             raise DegenerateError(f"frame {frame}: limb {name}: marker {marker} has no place or no depth")
     return np.where(missing[..., None], 0.0, ends), np.where(missing, 1.0, depths)
+
+
+def _slits(ink: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Where paper shows through between two lines: darker on both sides, within two pixels along some direction."""
+    dark = np.rint(255 * ink).astype(np.uint8)
+    found = np.zeros(dark.shape, bool)
+    for step in ((0, 1), (1, 0), (1, 1), (1, -1)):
+        side = np.zeros((5, 5), np.uint8)
+        for away in (1, 2):
+            side[2 + away * step[0], 2 + away * step[1]] = 1
+        walls = cv2.min(cv2.dilate(dark, side), cv2.dilate(dark, side[::-1, ::-1].copy()))
+        found |= cv2.subtract(walls, dark) >= SLIT
+    return found
 
 
 def _labels(shot: Shot, frame: int, picture: NDArray[np.uint8]) -> tuple[NDArray[np.uint8] | None, tuple[str, ...]]:

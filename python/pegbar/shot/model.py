@@ -61,6 +61,7 @@ class DrawingSection(Section):
     threshold: int = Field(128, ge=0, le=255)
     first_marked: int | None = None
     matte: Literal["auto", "ink", "unmix", "fill", "alpha"] = "auto"
+    white_point: int = Field(255, ge=1, le=255)
     interpolation: Literal["linear", "perspective"] = "linear"
 
     @property
