@@ -31,6 +31,7 @@ frames = "d.####.{suffix}"
 labels = {json.dumps(str(source / "seg" / "###.png"))}
 annotations = {json.dumps(str(source / "annotation.json"))}
 white_point = {white_point}
+first_marked = 0
 """)
     return open_shot(folder / "shot.toml"), pictures
 
