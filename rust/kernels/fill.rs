@@ -15,7 +15,7 @@ use rayon::prelude::*;
 const INWARD: usize = 2;
 
 /// How far along the outline its ink is looked for.
-const ALONG: usize = 4;
+const ALONG: usize = 5;
 
 /// Ink is at least this far from white in every channel.
 const INK: u8 = 128;
@@ -23,8 +23,8 @@ const INK: u8 = 128;
 /// Squared distance in 8-bit RGB within which ink explains a pixel as well as the best does.
 const CLOSE: i32 = 6 * 6;
 
-/// Squared distance in 8-bit RGB below which a pixel is one flat paint with the next one farther in.
-const FLAT: i32 = 5 * 5;
+/// Paint beside the outside that is at most this much lighter than a pixel, in 8-bit levels, leaves it no paper.
+const PALER: u8 = 16;
 
 /// Squared distance in 8-bit RGB: paint nearer to white than this tells nothing of alpha, and paint over white that comes
 /// no nearer to a pixel does not explain it.
@@ -133,42 +133,34 @@ fn border<const C: usize>(
 ) -> ([u8; 3], f32) {
     let own = depths[row * width + column];
     let outward = outward(depths, width, [row, column]);
-    if own == depth::CORNER && has_darker_outward(pixels, width, [row, column], outward, drawn) {
+    if own == depth::CORNER && has_paint_outward(pixels, width, [row, column], outward, drawn) {
         return (drawn, 1.0);
     }
-    let (mut flat, mut paint, mut any, mut ink) = (false, NOTHING, NOTHING, u8::MAX);
+    let (mut best, mut ink) = ((i32::MAX, usize::MAX, u8::MAX), u8::MAX);
     for [y, x] in around([row, column], ALONG, [depths.len() / width, width]) {
         let [down, right] = [y as i32 - row as i32, x as i32 - column as i32];
-        let farther_in = depths[y * width + x] > own && down.abs().max(right.abs()) <= INWARD as i32;
-        let along = matches!(depths[y * width + x], depth::SIDE | depth::CORNER)
-            && [y, x] != [row, column]
-            && down * outward[0] + right * outward[1] <= 0;
-        if !farther_in && !along {
+        let deep = depths[y * width + x];
+        let farther_in = deep > own && down.abs().max(right.abs()) <= INWARD as i32;
+        let along = matches!(deep, depth::SIDE | depth::CORNER) && down * outward[0] + right * outward[1] <= 0;
+        if !farther_in && !along || [y, x] == [row, column] {
             continue;
         }
         let color = over_white(&pixels[y * width + x]);
-        let is_ink = lightest(color) <= u8::MAX - INK;
-        if !farther_in && !is_ink {
-            continue;
-        }
-        if let Some(found) = explain(drawn, color) {
-            any = any.min(found);
-            if farther_in {
-                paint = paint.min(found);
-                flat |= down.abs() + right.abs() == 1 && apart(drawn, color) < FLAT;
-            }
-            if is_ink && found.0 <= CLOSE {
-                ink = ink.min(found.1);
+        let is_ink = color.iter().all(|value| *value <= u8::MAX - INK);
+        if (farther_in || is_ink)
+            && let Some((miss, alpha)) = explain(drawn, color)
+        {
+            // Equally good ones: the nearest, then the more opaque.
+            best = best.min((miss, y.abs_diff(row).pow(2) + x.abs_diff(column).pow(2), u8::MAX - alpha));
+            if is_ink && miss <= CLOSE {
+                ink = ink.min(alpha);
             }
         }
     }
-    let alpha = if flat { paint.1 } else { any.1.min(ink) };
+    let alpha = if best.0 == i32::MAX { u8::MAX } else { ink.min(u8::MAX - best.2) };
     let alpha = alpha.max(u8::MAX - darkest(drawn));
     (without_white(drawn, alpha), OPACITY[usize::from(alpha)])
 }
-
-/// What explains a pixel that nothing explains: by no means, and opaque.
-const NOTHING: (i32, u8) = (i32::MAX, u8::MAX);
 
 /// The pixels of a picture of `size` within `reach` of one in rows and columns.
 fn around([row, column]: [usize; 2], reach: usize, size: [usize; 2]) -> impl Iterator<Item = [usize; 2]> {
@@ -177,15 +169,20 @@ fn around([row, column]: [usize; 2], reach: usize, size: [usize; 2]) -> impl Ite
     near(row, size[0]).flat_map(move |y| columns.clone().map(move |x| [y, x]))
 }
 
-/// Where the outside lies: the steps to the outside neighbours, added up.
+/// Where the outside lies: the steps to the outside neighbours, added up; beyond the picture the figure goes on.
 fn outward(depths: &[u8], width: usize, [row, column]: [usize; 2]) -> [i32; 2] {
-    let near = around([row, column], 1, [depths.len() / width, width]);
-    near.filter(|[y, x]| depths[y * width + x] == depth::OUTSIDE)
-        .fold([0, 0], |[down, right], [y, x]| [down + y as i32 - row as i32, right + x as i32 - column as i32])
+    let on = |at: usize, step: i32, end: usize| at.saturating_add_signed(step as isize).min(end - 1);
+    let mut sum = [0, 0];
+    for [down, right] in [-1, 0, 1].into_iter().flat_map(|down| [-1, 0, 1].map(|right| [down, right])) {
+        if depths[on(row, down, depths.len() / width) * width + on(column, right, width)] == depth::OUTSIDE {
+            sum = [sum[0] + down, sum[1] + right];
+        }
+    }
+    sum
 }
 
-/// Whether a line runs between a pixel and the outside: a side neighbour on that side is darker.
-fn has_darker_outward<const C: usize>(
+/// Whether paint lies between a pixel and the outside: a side neighbour towards it is darker or hardly lighter.
+fn has_paint_outward<const C: usize>(
     pixels: &[[u8; C]],
     width: usize,
     at: [usize; 2],
@@ -196,23 +193,13 @@ fn has_darker_outward<const C: usize>(
         let [down, right] = [y as i32 - at[0] as i32, x as i32 - at[1] as i32];
         down.abs() + right.abs() == 1
             && down * outward[0] + right * outward[1] > 0
-            && darkest(over_white(&pixels[y * width + x])) < darkest(drawn)
+            && darkest(over_white(&pixels[y * width + x])) < darkest(drawn).saturating_add(PALER)
     })
 }
 
 /// The least of the channels.
 fn darkest([r, g, b]: [u8; 3]) -> u8 {
     r.min(g).min(b)
-}
-
-/// The greatest of the channels.
-fn lightest([r, g, b]: [u8; 3]) -> u8 {
-    r.max(g).max(b)
-}
-
-/// Squared distance of two colours.
-fn apart(a: [u8; 3], b: [u8; 3]) -> i32 {
-    (0..3).map(|i| (i32::from(a[i]) - i32::from(b[i])).pow(2)).sum()
 }
 
 /// The alpha with which `paint` over white comes nearest to `drawn`, and by how much it misses it (squared).

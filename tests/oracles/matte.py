@@ -58,23 +58,22 @@ def border(drawn, deep, at):
     """The alpha of a border pixel in 255ths: the best paint farther in, or the darkest ink about as good."""
     dark, here = 255 - drawn.astype(int), np.array(at)
     steps = {place: np.array(place) - here for place in np.ndindex(deep.shape)}
-    near = {place: step for place, step in steps.items() if 0 < abs(step).max() <= 4}
-    outward = sum((step for place, step in near.items() if abs(step).max() == 1 and deep[place] == 0), np.zeros(2))
+    near = {place: step for place, step in steps.items() if 0 < abs(step).max() <= 5}
+    on = [(np.clip(here + step, 0, np.array(deep.shape) - 1), step) for step in np.argwhere(np.ones((3, 3))) - 1]
+    outward = sum((step for place, step in on if deep[tuple(place)] == 0), np.zeros(2))
     beside = [place for place, step in near.items() if abs(step).sum() == 1 and step @ outward > 0]
-    if deep[at] == 2 and any(dark[place].max() > dark[at].max() for place in beside):
+    if deep[at] == 2 and any(dark[place].max() > max(dark[at].max() - 16, 0) for place in beside):
         return 255
-    paint, ink, close, flat = [], [], [], False
+    every, ink = [], [255]
     for place, step in near.items():
+        is_ink = dark[place].min() >= 128
         inward = deep[place] > deep[at] and abs(step).max() <= 2
-        along = deep[place] in (1, 2) and step @ outward <= 0 and dark[place].min() >= 128
+        along = is_ink and deep[place] in (1, 2) and step @ outward <= 0
         found = explain(dark[at], dark[place]) if inward or along else None
         if found:
-            (paint if inward else ink).append(found)
-            close += [found[1]] if dark[place].min() >= 128 and found[0] <= 36 else []
-            apart = ((dark[at] - dark[place]) ** 2).sum()
-            flat |= inward and abs(step).sum() == 1 and apart < 25
-    best = min(paint)[1] if flat else min([min(paint + ink, default=(0, 255))[1], *close])
-    return max(best, dark[at].max())
+            every.append((found[0], step @ step, -found[1]))
+            ink += [found[1]] if is_ink and found[0] <= 36 else []
+    return max(min(-min(every)[2], min(ink)) if every else 255, dark[at].max())
 
 
 def fill(image, labels):

@@ -36,6 +36,26 @@ first_marked = 0
     return open_shot(folder / "shot.toml"), pictures
 
 
+@pytest.mark.parametrize(("paper", "white_point"), [(255, 255), (250, 245)])
+def test_rims_are_neither_too_bright_nor_too_dark_over_a_dark_plate(test_data, tmp_path, paper, white_point):
+    source = test_data / "annotated" / "morevna_side_walk"
+    shot, pictures = papers(tmp_path, source, paper=paper, white_point=white_point, suffix="png")
+    rims, brighter, darker = 0, np.zeros(2, int), np.zeros(2, int)
+    for frame, picture in pictures.items():
+        drawn, alpha = read_drawn(shot, frame), picture[..., 3:] / 255
+        want = picture[..., :3] * alpha + PLATE * (1 - alpha)
+        got = drawn.color * drawn.alpha[..., None] + PLATE * (1 - drawn.alpha[..., None])
+        rim = ndimage.binary_dilation(alpha[..., 0] > 0) & ~ndimage.binary_erosion(alpha[..., 0] == 1, iterations=2)
+        rims += rim.sum()
+        for error, counts in ((got - want, brighter), (want - got, darker)):
+            counts += [(error.max(axis=2)[rim] > limit).sum() for limit in (40, 20)]
+    assert rims > 60_000
+    assert brighter[0] <= 0.005 * rims
+    assert brighter[1] <= 0.015 * rims
+    assert darker[0] <= 0.0009 * rims
+    assert darker[1] <= 0.004 * rims
+
+
 @pytest.mark.parametrize(
     ("paper", "white_point", "suffix", "specks"), [(250, 245, "png", 0), (250, 235, "jpg", 3), (255, 255, "png", 0)]
 )

@@ -69,7 +69,8 @@ def matte(
         - "ink": equations 14 and 15 of Jain et al. 2010, alpha = darkness, colour as drawn. Light colours become glass.
         - "unmix": alpha = 1 - min(R, G, B), and the colour that over white gives the drawing back.
         - "fill": alpha 1 inside the labelled limbs, "unmix" outside. The limbs' border pixels, part paint and part
-          paper, get the alpha with which the paint farther in explains them; hard borders stay opaque.
+          paper, get the alpha with which the paint farther in or the outline's ink explains them; hard borders stay
+          opaque.
         - "alpha": the picture's own alpha and colour.
         - "auto": "alpha" for a picture whose alpha channel is not all 255, else "fill" if there are labels, else
           "unmix".

@@ -21,7 +21,7 @@ from pegbar.shot.plan import Shot
 FAINT = 0.1
 
 # How much lighter than the ink on both sides paper is that shows between them, in 8-bit levels.
-SLIT = 64
+SLIT = 96
 
 
 @dataclass(frozen=True, eq=False)
