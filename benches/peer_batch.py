@@ -18,7 +18,7 @@ from pegbar.sample.shot import write_sample
 from pegbar.shot.plan import Shot, open_shot
 from pegbar.shot.stages import CompositeStage
 
-FRAMES = 48
+FRAMES = 96
 
 
 def run() -> Iterator[Row]:

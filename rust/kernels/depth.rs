@@ -6,6 +6,7 @@
 use crate::checks::first_fault;
 use crate::error::{KernelError, check_length};
 use glam::DVec2;
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 /// How depth runs from one end of a limb to the other, along the drawn segment.
@@ -41,6 +42,7 @@ impl Axis {
     }
 
     /// Fills one run of pixels of this limb in one row.
+    #[inline(always)]
     fn fill(&self, row: usize, column: usize, out: &mut [f32]) {
         let start = self.at_origin + (DVec2::new(column as f64, row as f64) - self.origin).dot(self.slope);
         let steps: [f64; LANES] = std::array::from_fn(|i| self.slope.x * i as f64);
@@ -55,6 +57,7 @@ impl Axis {
     }
 
     /// The depth where the axis, longer than its limb, has `free`.
+    #[inline(always)]
     fn depth(&self, free: f64) -> f32 {
         // Not `clamp`: its care for NaN keeps the compiler from packed minima and maxima.
         let above = if free > self.low { free } else { self.low };
@@ -67,6 +70,7 @@ impl Axis {
 const LANES: usize = 8;
 
 /// How many labels at the front are the same.
+#[inline(always)]
 fn run_length(labels: &[u8]) -> usize {
     let (blocks, rest) = labels.as_chunks::<32>();
     let first = labels[0];
@@ -108,6 +112,7 @@ pub fn limb_depth(
 
 const ABOVE: &str = "a label above the number of limbs";
 
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
 fn limb_depth_row(row: usize, labels: &[u8], axes: &[Axis], out: &mut [f32]) -> Result<(), KernelError> {
     let mut column = 0;
     while column < labels.len() {

@@ -47,9 +47,11 @@ def run_stage(name: str, stage: Stage, options: BatchOptions) -> int:
     if not frames:
         raise ValueError("the shot has no frames")
     stage.prepare(frames)
-    count = Counter[str]()
-    results = run_frames(stage, frames, jobs=options.jobs, go_on=lambda: options.keep_going or not count["failed"])
-    with closing(results), progress(name, len(frames)) as advance:
+    # Told here, so that no worker is started for frames that need none.
+    todo = [frame for frame in frames if not stage.is_done(frame)]
+    count = Counter({"up to date": len(frames) - len(todo)})
+    results = run_frames(stage, todo, jobs=options.jobs, go_on=lambda: options.keep_going or not count["failed"])
+    with closing(results), progress(name, len(todo)) as advance:
         for result in results:
             advance()
             if result.error is not None:

@@ -51,13 +51,19 @@ class Stage:
         for path in inputs:
             if not path.is_file():
                 raise FileNotFoundError(f"frame {frame}: no such file: {path}")
-        recipe = self._recipe(frame)
-        if not self.overwrite and is_up_to_date(outputs, recipe, inputs):
+        if self.is_done(frame):
             return Outcome(False, tuple(outputs))
-        prints = [fingerprint(path) for path in inputs]
+        recipe, prints = self._recipe(frame), [fingerprint(path) for path in inputs]
         notes = self.make(frame)
         write_record(outputs, recipe, prints)
         return Outcome(True, tuple(outputs), notes)
+
+    def is_done(self, frame: int) -> bool:
+        """Whether ``frame`` needs no work: its outputs are there and nothing that they depend on has changed."""
+        try:
+            return not self.overwrite and is_up_to_date(self.outputs(frame), self._recipe(frame), self.inputs(frame))
+        except ValueError:
+            return False
 
     def prepare(self, frames: list[int]) -> None:
         """Make the output folders and clear what killed runs left in them; OSError where that cannot be."""
