@@ -1,8 +1,8 @@
 """Runs one task over many frames, in worker processes, with bounded memory.
 
 Each worker holds one frame at a time and talks through a pipe of its own, so that it ends by itself when the parent
-is killed, and the parent notices a worker that dies. Processes, not threads: the EXR and PNG codecs keep the
-interpreter busy.
+is killed, and the parent notices a worker that dies. Processes, not threads: a codec that crashes or is killed fails
+its own frame only, and what runs in Python between the codecs does not wait for the other frames.
 """
 
 from __future__ import annotations
