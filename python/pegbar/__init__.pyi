@@ -22,6 +22,7 @@ from .scene.drawing import Drawing as Drawing
 from .scene.drawing import Limb as Limb
 from .scene.mesh import Mesh as Mesh
 from .scene.motion import Motion as Motion
+from .scene.orthographic import OrthographicCamera as OrthographicCamera
 from .simulate.passes import Ink as Ink
 from .simulate.passes import Passes as Passes
 from .simulate.passes import render_passes as render_passes

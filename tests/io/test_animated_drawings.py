@@ -4,7 +4,7 @@ import yaml
 
 from pegbar import FormatError, read_annotations, write_annotations
 from pegbar.io.animated_drawings import read_char_config
-from pegbar.io.body import LIMBS, MARKERS
+from pegbar.scene.body import LIMBS, MARKERS
 
 
 @pytest.mark.parametrize("name", ["char1", "char2", "char4"])

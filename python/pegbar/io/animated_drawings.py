@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from pegbar.errors import FormatError
-from pegbar.io import body
 from pegbar.io.places import Misplaced, Place, items, table, text, whole
+from pegbar.scene import body
 from pegbar.scene.drawing import Drawing, Limb
 
 _Path = str | os.PathLike[str]

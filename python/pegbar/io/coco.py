@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pegbar.errors import FormatError
-from pegbar.io import body, places
+from pegbar.io import places
 from pegbar.io.places import Misplaced, Place, items, number, table, text, whole
+from pegbar.scene import body
 from pegbar.scene.drawing import Drawing
 
 _Path = str | os.PathLike[str]

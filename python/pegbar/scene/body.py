@@ -1,4 +1,4 @@
-"""The limbs of the canonical markers, and marks derived from others for formats that lack them."""
+"""The canonical markers, the limbs between them, and marks derived from others for formats that lack them."""
 
 from __future__ import annotations
 
