@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from pegbar import _kernels
 from pegbar.errors import FormatError
@@ -153,10 +152,9 @@ def _channels(
     for column, code in enumerate(codes):
         if code < 3:
             columns[column] = columns[column] + skeleton.position[code]
-    preset = Rotation.from_matrix(skeleton.orientation).as_euler("ZYX") / angle
-    if preset.any():
-        codes += [5, 4, 3]
-        columns += [np.full(len(values), turn) for turn in preset]
+    for axis, turn in reversed(skeleton.orientation.items()):
+        codes.append(3 + "xyz".index(axis))
+        columns.append(np.full(len(values), math.radians(turn) / angle if skeleton.degrees else turn / angle))
     counts, start, turns = [len(codes)], width, {bone.name: bone.turns for bone in bones}
     for name in names[1:]:
         own = turns.get(name, ())

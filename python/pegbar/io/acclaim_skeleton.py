@@ -45,8 +45,9 @@ class Bone:
 class Skeleton:
     """An ASF file.
 
-    ``order`` are the root's numbers in the AMC file as "tx" or "rx", ``position`` (3,) and ``orientation`` (3, 3) move
-    the whole clip; ``children`` are names by the parent's, bones by name; ``length`` and ``degrees`` are its units.
+    ``order`` are the root's numbers in the AMC file as "tx" or "rx", ``position`` (3,) and ``orientation`` (angles in
+    the file's unit about fixed axes, by axis, the first first) move the whole clip; ``children`` are names by the
+    parent's, bones by name; ``length`` and ``degrees`` are its units.
     """
 
     path: _Path
@@ -54,7 +55,7 @@ class Skeleton:
     degrees: bool = True
     order: tuple[str, ...] = (*_MOVES, *_TURNS)
     position: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
-    orientation: NDArray[np.float64] = field(default_factory=lambda: np.eye(3))
+    orientation: dict[str, float] = field(default_factory=dict)
     bones: dict[str, Bone] = field(default_factory=dict)
     children: dict[str, list[str]] = field(default_factory=dict)
 
@@ -97,14 +98,12 @@ def _numbers(path: _Path, line: int, words: list[str], count: int) -> list[float
     return [number(path, word, line) for word in words[:count]]
 
 
-def _turned(skeleton: Skeleton, line: int, words: list[str], order: str) -> NDArray[np.float64]:
-    """Axes (3, 3) turned by three angles about the fixed axes, in ``order``."""
+def _angles(path: _Path, line: int, words: list[str], order: str) -> dict[str, float]:
+    """The angles about x, y and z by axis, in the order in which they turn about the fixed axes."""
     if sorted(order.lower()) != list(_AXES):
-        raise FormatError(skeleton.path, f"want an order of axes as XYZ, got {order[:24]!r}", line=line)
-    angles = dict(zip(_AXES, _numbers(skeleton.path, line, words, 3), strict=True))
-    turn = [angles[axis] for axis in order.lower()]
-    matrix: NDArray[np.float64] = Rotation.from_euler(order.lower(), turn, degrees=skeleton.degrees).as_matrix()
-    return matrix
+        raise FormatError(path, f"want an order of axes as XYZ, got {order[:24]!r}", line=line)
+    angles = dict(zip(_AXES, _numbers(path, line, words, 3), strict=True))
+    return {axis: angles[axis] for axis in order.lower()}
 
 
 def _read_units(skeleton: Skeleton, lines: list[_Line]) -> None:
@@ -131,11 +130,12 @@ def _read_root(skeleton: Skeleton, lines: list[_Line]) -> None:
         skeleton.position = np.array(_numbers(skeleton.path, line, words, 3))
     if "orientation" in found:
         line, words = found["orientation"]
-        skeleton.orientation = _turned(skeleton, line, words, "".join(found.get("axis", (0, ["xyz"]))[1]))
+        skeleton.orientation = _angles(skeleton.path, line, words, "".join(found.get("axis", (0, ["xyz"]))[1]))
 
 
 def _read_bones(skeleton: Skeleton, lines: list[_Line]) -> None:
-    start, inside = 0, None
+    start = 0
+    inside: dict[str, _Line] | None = None
     for line, words in lines:
         key = words[0].lower()
         if key == "begin" and inside is None:
@@ -170,7 +170,8 @@ def _bone(skeleton: Skeleton, start: int, found: dict[str, _Line]) -> Bone:
     axes = np.eye(3)
     if "axis" in found:
         line, words = found["axis"]
-        axes = _turned(skeleton, line, words, words[3] if len(words) > 3 else "xyz")
+        angles = _angles(path, line, words, words[3] if len(words) > 3 else "xyz")
+        axes = Rotation.from_euler("".join(angles), list(angles.values()), degrees=skeleton.degrees).as_matrix()
     line, words = found.get("dof", (start, []))
     turns = tuple(word.lower() for word in words)
     if len(set(turns)) < len(turns) or not set(turns) <= set(_TURNS):

@@ -10,16 +10,19 @@ import math
 import os
 import struct
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from pegbar.errors import FormatError
 
+#: Values by group and name.
+Parameters = dict[tuple[str, str], list[Any]]
+Order = Literal["<", ">"]
 _Path = str | os.PathLike[str]
 _BLOCK = 512
 _KEY = 0x50
-_ORDERS = {84: "<", 85: "<", 86: ">"}
+_ORDERS: dict[int, Order] = {84: "<", 85: "<", 86: ">"}
 _DEC = 85
 _DTYPES = {-1: "S1", 1: "u1", 2: "i2", 4: "u4"}
 
@@ -32,14 +35,14 @@ class Header:
     ``stride`` the bytes of a frame, ``scale`` the unit of integers (0: the data is floats), ``order`` "<" or ">".
     """
 
-    parameters: dict[tuple[str, str], list[Any]]
+    parameters: Parameters
     points: int
     frames: int
     rate: float
     scale: float
     start: int
     stride: int
-    order: str
+    order: Order
     is_dec: bool
 
     def words(self, name: str) -> list[str]:
@@ -67,7 +70,7 @@ def read_header(path: _Path, data: bytes) -> Header:
         raise FormatError(path, f"the processor type is {processor}, want 84, 85 or 86", byte=begin + 3)
     order, is_dec = _ORDERS[processor], processor == _DEC
     try:
-        parameters, end = _Parameters(path, data, order, is_dec).read(begin)
+        parameters, end = _Chain(path, data, order, is_dec).read(begin)
     except (struct.error, IndexError):
         raise FormatError(path, "the parameters are damaged or cut short", byte=begin) from None
     return _agreed(path, data, parameters, end, order, is_dec)
@@ -80,13 +83,14 @@ def dec_floats(words: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
     return np.where(swapped & np.uint32(0x7F800000), floats, np.float32(0))
 
 
-class _Parameters:
+class _Chain:
     """Walks the chain of groups and parameters."""
 
-    def __init__(self, path: _Path, data: bytes, order: str, is_dec: bool) -> None:
+    def __init__(self, path: _Path, data: bytes, order: Order, is_dec: bool) -> None:
         self.path, self.data, self.order, self.is_dec = path, data, order, is_dec
+        self.left = len(data)
 
-    def read(self, begin: int) -> tuple[dict[tuple[str, str], list[Any]], int]:
+    def read(self, begin: int) -> tuple[Parameters, int]:
         """All parameters by group and name, and the byte at which the chain ends."""
         groups: dict[int, str] = {}
         found: list[tuple[int, str, list[Any]]] = []
@@ -116,8 +120,9 @@ class _Parameters:
         start, total = place + 2 + count, math.prod(sizes)
         if kind not in _DTYPES:
             raise FormatError(self.path, f"a parameter has type {kind}, which does not exist", byte=place)
-        if start + total * abs(kind) > len(self.data):
-            raise FormatError(self.path, "a parameter ends after the file", byte=place)
+        self.left -= total * abs(kind)
+        if start + total * abs(kind) > len(self.data) or self.left < 0:
+            raise FormatError(self.path, "the parameters are longer than the file", byte=place)
         if kind == -1:
             width = sizes[0] if sizes else 1
             raw = self.data[start : start + total]
@@ -129,9 +134,7 @@ class _Parameters:
         return list(values.tolist())
 
 
-def _agreed(
-    path: _Path, data: bytes, parameters: dict[tuple[str, str], list[Any]], end: int, order: str, is_dec: bool
-) -> Header:
+def _agreed(path: _Path, data: bytes, parameters: Parameters, end: int, order: Order, is_dec: bool) -> Header:
     points, analog, first, last = struct.unpack_from(f"{order}HHHH", data, 2)
     block, _ = struct.unpack_from(f"{order}HH", data, 16)
     scale, rate = (_float(data, place, order, is_dec) for place in (12, 20))
@@ -162,34 +165,33 @@ def _fits(size: int, start: int, end: int, length: int, stride: int) -> bool:
     return start >= end and 0 <= behind < max(_BLOCK, min(stride, 2 * _BLOCK))
 
 
-def _float(data: bytes, place: int, order: str, is_dec: bool) -> float:
+def _float(data: bytes, place: int, order: Order, is_dec: bool) -> float:
     words = np.frombuffer(data, np.dtype("u4").newbyteorder(order), 1, place)
     return float((dec_floats(words) if is_dec else words.view(np.dtype("f4").newbyteorder(order)))[0])
 
 
-def _first(parameters: dict[tuple[str, str], list[Any]], name: str, otherwise: float) -> float:
-    values = parameters.get(("POINT", name), [])
-    return values[0] if values and isinstance(values[0], int | float) else otherwise
+def _first(parameters: Parameters, name: str, otherwise: float) -> float:
+    """A number of POINT, or ``otherwise`` where it is missing or no finite number."""
+    value = next(iter(parameters.get(("POINT", name), [])), otherwise)
+    return value if isinstance(value, int | float) and math.isfinite(value) else otherwise
 
 
-def _frames(path: _Path, parameters: dict[tuple[str, str], list[Any]], first: int, last: int) -> int:
+def _frames(path: _Path, parameters: Parameters, first: int, last: int) -> int:
     """How many frames are announced: header, POINT:FRAMES and TRIAL must agree, as far as each can count."""
-    header = last - first + 1
-    said = {"the header": header}
-    if ("POINT", "FRAMES") in parameters:
-        said["POINT:FRAMES"] = int(_first(parameters, "FRAMES", 0))
-    if ("POINT", "LONG_FRAMES") in parameters:
-        said["POINT:LONG_FRAMES"] = int(_first(parameters, "LONG_FRAMES", 0))
+    said = {"the header": last - first + 1}
+    for name in ("FRAMES", "LONG_FRAMES"):
+        if ("POINT", name) in parameters:
+            said[f"POINT:{name}"] = int(_first(parameters, name, 0))
     ends = [parameters.get(("TRIAL", f"ACTUAL_{which}_FIELD"), []) for which in ("START", "END")]
     if all(len(end) == 2 and isinstance(end[0], int) for end in ends):
         begin, finish = ((end[0] & 0xFFFF) + ((end[1] & 0xFFFF) << 16) for end in ends)
         said["TRIAL"] = finish - begin + 1
     most = max(said.values())
     for who, count in said.items():
-        # A count in 16 bits of a longer clip is cut off or stands at its limit.
-        short = most > 0xFFFF and who != "TRIAL" and (count in (0xFFFF, -1, 0x7FFF) or (most - count) % 0x10000 == 0)
-        if count != most and not short and not (count < 0 and count + 0x10000 == most) and last != 0xFFFF:
-            listed = ", ".join(f"{name} {count}" for name, count in said.items())
+        # In a longer clip a count of 16 bits is cut off or stands at its limit.
+        is_short = most > 0x7FFF and ((most - count) % 0x10000 == 0 or count in (0x7FFF, 0xFFFF))
+        if count != most and not is_short and (who, last) != ("the header", 0xFFFF):
+            listed = ", ".join(f"{name} {number}" for name, number in said.items())
             raise FormatError(path, f"the counts of frames disagree: {listed}", byte=6)
     if most < 1:
         raise FormatError(path, "the file says it has no frames", byte=6)
