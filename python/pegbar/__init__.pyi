@@ -1,3 +1,7 @@
+from .align.descriptor import pose_descriptor as pose_descriptor
+from .align.descriptor import pose_distance as pose_distance
+from .align.timewarp import TimeWarp as TimeWarp
+from .align.timewarp import time_warp as time_warp
 from .errors import DegenerateError as DegenerateError
 from .errors import FormatError as FormatError
 from .errors import MissingFrameError as MissingFrameError

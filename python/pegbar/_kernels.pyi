@@ -16,11 +16,13 @@ __all__ = [
     "matte",
     "own_alpha",
     "palette_labels",
+    "pose_distance",
     "render_passes",
     "resolve_passes",
     "rim_depth",
     "segment_stick_figure",
     "stroke_polyline",
+    "time_warp",
     "unpremultiply",
 ]
 
@@ -86,3 +88,7 @@ def composite_matte(
     scale: int,
 ) -> NDArray[np.float32]: ...
 def rim_depth(rendered: NDArray[Any], rendered_depth: NDArray[np.float32]) -> NDArray[np.float32] | None: ...
+def pose_distance(a: _Doubles, b: _Doubles, weights: _Doubles, a_trust: _Doubles, b_trust: _Doubles) -> _Doubles: ...
+def time_warp(
+    cost: _Doubles, open_begin: bool, open_end: bool, slope_limit: int | None
+) -> tuple[float, NDArray[np.int64]]: ...

@@ -4,6 +4,7 @@ mod arrays;
 mod color;
 mod composite;
 mod depth;
+mod descriptor;
 mod errors;
 mod grow;
 mod holdout;
@@ -13,6 +14,7 @@ mod palette;
 mod raster;
 mod rim;
 mod segment;
+mod warp;
 
 use pyo3::prelude::*;
 
@@ -25,6 +27,8 @@ mod _kernels {
     use crate::composite::depth_composite;
     #[pymodule_export]
     use crate::depth::limb_depth;
+    #[pymodule_export]
+    use crate::descriptor::pose_distance;
     #[pymodule_export]
     use crate::grow::grow_labels;
     #[pymodule_export]
@@ -41,4 +45,6 @@ mod _kernels {
     use crate::rim::rim_depth;
     #[pymodule_export]
     use crate::segment::segment_stick_figure;
+    #[pymodule_export]
+    use crate::warp::time_warp;
 }
