@@ -22,6 +22,7 @@ from .layer.volumes import collision_volumes as collision_volumes
 from .scene.camera import PerspectiveCamera as PerspectiveCamera
 from .scene.drawing import Drawing as Drawing
 from .scene.drawing import Limb as Limb
+from .scene.joints import map_joints as map_joints
 from .scene.mesh import Mesh as Mesh
 from .scene.motion import Motion as Motion
 from .scene.orthographic import OrthographicCamera as OrthographicCamera
