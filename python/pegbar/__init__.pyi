@@ -19,6 +19,7 @@ from .layer.segmentation import palette_labels as palette_labels
 from .layer.segmentation import segment_stick_figure as segment_stick_figure
 from .layer.volumes import TaperedCylinders as TaperedCylinders
 from .layer.volumes import collision_volumes as collision_volumes
+from .lift.backprojection import back_project as back_project
 from .scene.camera import PerspectiveCamera as PerspectiveCamera
 from .scene.drawing import Drawing as Drawing
 from .scene.drawing import Limb as Limb
