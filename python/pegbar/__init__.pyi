@@ -1,3 +1,5 @@
+from .align.camera_track import CameraTrack as CameraTrack
+from .align.registration import register_cameras as register_cameras
 from .errors import DegenerateError as DegenerateError
 from .errors import FormatError as FormatError
 from .errors import MissingFrameError as MissingFrameError
