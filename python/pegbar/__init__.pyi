@@ -2,6 +2,7 @@ from .align.camera_track import CameraTrack as CameraTrack
 from .align.registration import register_cameras as register_cameras
 from .errors import DegenerateError as DegenerateError
 from .errors import FormatError as FormatError
+from .errors import MissingExtraError as MissingExtraError
 from .errors import MissingFrameError as MissingFrameError
 from .errors import PegbarError as PegbarError
 from .errors import ShotError as ShotError
