@@ -9,6 +9,7 @@ __all__ = [
     "depth_composite",
     "fill_matte",
     "fill_polygon",
+    "forward_kinematics",
     "grow_labels",
     "has_alpha",
     "ink_alpha",
@@ -16,6 +17,7 @@ __all__ = [
     "matte",
     "own_alpha",
     "palette_labels",
+    "parse_bvh",
     "render_passes",
     "resolve_passes",
     "rim_depth",
@@ -86,3 +88,11 @@ def composite_matte(
     scale: int,
 ) -> NDArray[np.float32]: ...
 def rim_depth(rendered: NDArray[Any], rendered_depth: NDArray[np.float32]) -> NDArray[np.float32] | None: ...
+def parse_bvh(
+    path: str, text: bytes
+) -> tuple[
+    tuple[list[str], list[int], _Doubles, list[int], _Doubles], tuple[list[int], NDArray[np.uint8], float, _Doubles]
+]: ...
+def forward_kinematics(
+    joints: tuple[list[int], _Doubles, _Doubles, list[int], NDArray[np.uint8]], values: _Doubles, angle: float
+) -> tuple[_Doubles, _Doubles]: ...

@@ -1,12 +1,14 @@
 //! `pegbar._kernels`: registers the wrappers; each file carries its kernel's name.
 
 mod arrays;
+mod bvh;
 mod color;
 mod composite;
 mod depth;
 mod errors;
 mod grow;
 mod holdout;
+mod kinematics;
 mod matte;
 mod paint;
 mod palette;
@@ -20,6 +22,8 @@ use pyo3::prelude::*;
 #[pymodule(gil_used = false)]
 mod _kernels {
     #[pymodule_export]
+    use crate::bvh::parse_bvh;
+    #[pymodule_export]
     use crate::color::convert_srgb;
     #[pymodule_export]
     use crate::composite::depth_composite;
@@ -29,6 +33,8 @@ mod _kernels {
     use crate::grow::grow_labels;
     #[pymodule_export]
     use crate::holdout::composite_matte;
+    #[pymodule_export]
+    use crate::kinematics::forward_kinematics;
     #[pymodule_export]
     use crate::matte::{fill_matte, has_alpha, ink_alpha, matte, own_alpha};
     #[pymodule_export]

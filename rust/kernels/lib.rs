@@ -1,6 +1,7 @@
 //! The pure kernels of pegbar, one file each, without Python. This file names the modules and defines nothing.
 
 pub mod band;
+pub mod bvh;
 pub mod checks;
 pub mod clip;
 pub mod color;
@@ -12,6 +13,7 @@ pub mod fill;
 pub mod grow;
 pub mod holdout;
 pub mod ink;
+pub mod kinematics;
 pub mod matte;
 pub mod paint;
 pub mod palette;
@@ -22,3 +24,4 @@ pub mod segment;
 mod settle;
 pub mod shade;
 pub mod surface;
+pub mod words;
