@@ -1,0 +1,1 @@
+"""From two dimensions to three: limbs, markers, joint angles, back-projection."""
