@@ -9,6 +9,7 @@ __all__ = [
     "depth_composite",
     "fill_matte",
     "fill_polygon",
+    "fit_poses",
     "grow_labels",
     "has_alpha",
     "ink_alpha",
@@ -86,3 +87,8 @@ def composite_matte(
     scale: int,
 ) -> NDArray[np.float32]: ...
 def rim_depth(rendered: NDArray[Any], rendered_depth: NDArray[np.float32]) -> NDArray[np.float32] | None: ...
+def fit_poses(
+    joints: _Doubles,
+    poses: _Doubles,
+    options: tuple[list[float], float, float | None, float, str, float, int],
+) -> tuple[_Doubles, _Doubles, _Doubles]: ...
