@@ -1,4 +1,6 @@
 from .align.camera_track import CameraTrack as CameraTrack
+from .align.pose import fit_pose as fit_pose
+from .align.pose_fit import PoseFit as PoseFit
 from .align.registration import register_cameras as register_cameras
 from .errors import DegenerateError as DegenerateError
 from .errors import FormatError as FormatError

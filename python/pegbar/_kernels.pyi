@@ -9,6 +9,7 @@ __all__ = [
     "depth_composite",
     "fill_matte",
     "fill_polygon",
+    "fit_poses",
     "forward_kinematics",
     "grow_labels",
     "has_alpha",
@@ -96,3 +97,8 @@ def parse_bvh(
 def forward_kinematics(
     joints: tuple[list[int], _Doubles, _Doubles, list[int], NDArray[np.uint8]], values: _Doubles, angle: float
 ) -> tuple[_Doubles, _Doubles]: ...
+def fit_poses(
+    joints: _Doubles,
+    poses: _Doubles,
+    options: tuple[list[float], float, float | None, float, str, float, int],
+) -> tuple[_Doubles, _Doubles, _Doubles]: ...

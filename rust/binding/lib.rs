@@ -12,6 +12,7 @@ mod kinematics;
 mod matte;
 mod paint;
 mod palette;
+mod pose;
 mod raster;
 mod rim;
 mod segment;
@@ -41,6 +42,8 @@ mod _kernels {
     use crate::paint::{fill_polygon, stroke_polyline, unpremultiply};
     #[pymodule_export]
     use crate::palette::palette_labels;
+    #[pymodule_export]
+    use crate::pose::fit_poses;
     #[pymodule_export]
     use crate::raster::{render_passes, resolve_passes};
     #[pymodule_export]
