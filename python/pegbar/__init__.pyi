@@ -18,7 +18,9 @@ from .layer.segmentation import grow_labels as grow_labels
 from .layer.segmentation import palette_labels as palette_labels
 from .layer.segmentation import segment_stick_figure as segment_stick_figure
 from .lift.backprojection import back_project as back_project
+from .lift.hidden import fill_hidden as fill_hidden
 from .scene.camera import PerspectiveCamera as PerspectiveCamera
+from .scene.contacts import foot_contacts as foot_contacts
 from .scene.drawing import Drawing as Drawing
 from .scene.drawing import Limb as Limb
 from .scene.mesh import Mesh as Mesh
