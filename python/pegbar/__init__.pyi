@@ -1,3 +1,5 @@
+from .align.camera_track import CameraTrack as CameraTrack
+from .align.registration import register_cameras as register_cameras
 from .errors import DegenerateError as DegenerateError
 from .errors import FormatError as FormatError
 from .errors import MissingFrameError as MissingFrameError
@@ -17,12 +19,15 @@ from .layer.segmentation import LabelMap as LabelMap
 from .layer.segmentation import grow_labels as grow_labels
 from .layer.segmentation import palette_labels as palette_labels
 from .layer.segmentation import segment_stick_figure as segment_stick_figure
+from .layer.volumes import TaperedCylinders as TaperedCylinders
+from .layer.volumes import collision_volumes as collision_volumes
 from .lift.backprojection import back_project as back_project
 from .lift.hidden import fill_hidden as fill_hidden
 from .scene.camera import PerspectiveCamera as PerspectiveCamera
 from .scene.contacts import foot_contacts as foot_contacts
 from .scene.drawing import Drawing as Drawing
 from .scene.drawing import Limb as Limb
+from .scene.joints import map_joints as map_joints
 from .scene.mesh import Mesh as Mesh
 from .scene.motion import Motion as Motion
 from .scene.orthographic import OrthographicCamera as OrthographicCamera

@@ -1,1 +1,1 @@
-"""From the drawing to three dimensions."""
+"""From two dimensions to three: limbs, markers, joint angles, back-projection."""
