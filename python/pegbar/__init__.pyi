@@ -17,6 +17,8 @@ from .layer.segmentation import LabelMap as LabelMap
 from .layer.segmentation import grow_labels as grow_labels
 from .layer.segmentation import palette_labels as palette_labels
 from .layer.segmentation import segment_stick_figure as segment_stick_figure
+from .lift.limbs import align_limbs as align_limbs
+from .lift.markers import reconstruct_markers as reconstruct_markers
 from .scene.camera import PerspectiveCamera as PerspectiveCamera
 from .scene.drawing import Drawing as Drawing
 from .scene.drawing import Limb as Limb

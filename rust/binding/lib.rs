@@ -7,6 +7,7 @@ mod depth;
 mod errors;
 mod grow;
 mod holdout;
+mod lift;
 mod matte;
 mod paint;
 mod palette;
@@ -29,6 +30,8 @@ mod _kernels {
     use crate::grow::grow_labels;
     #[pymodule_export]
     use crate::holdout::composite_matte;
+    #[pymodule_export]
+    use crate::lift::lift_markers;
     #[pymodule_export]
     use crate::matte::{fill_matte, has_alpha, ink_alpha, matte, own_alpha};
     #[pymodule_export]

@@ -12,6 +12,7 @@ pub mod fill;
 pub mod grow;
 pub mod holdout;
 pub mod ink;
+pub mod lift;
 pub mod matte;
 pub mod paint;
 pub mod palette;
