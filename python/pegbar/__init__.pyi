@@ -1,3 +1,5 @@
+from .align.camera_track import CameraTrack as CameraTrack
+from .align.registration import register_cameras as register_cameras
 from .errors import DegenerateError as DegenerateError
 from .errors import FormatError as FormatError
 from .errors import MissingFrameError as MissingFrameError
@@ -19,9 +21,13 @@ from .layer.segmentation import palette_labels as palette_labels
 from .layer.segmentation import segment_stick_figure as segment_stick_figure
 from .lift.limbs import align_limbs as align_limbs
 from .lift.markers import reconstruct_markers as reconstruct_markers
+from .layer.volumes import TaperedCylinders as TaperedCylinders
+from .layer.volumes import collision_volumes as collision_volumes
+from .lift.backprojection import back_project as back_project
 from .scene.camera import PerspectiveCamera as PerspectiveCamera
 from .scene.drawing import Drawing as Drawing
 from .scene.drawing import Limb as Limb
+from .scene.joints import map_joints as map_joints
 from .scene.mesh import Mesh as Mesh
 from .scene.motion import Motion as Motion
 from .scene.orthographic import OrthographicCamera as OrthographicCamera

@@ -1,1 +1,1 @@
-"""Drawings to 3D: limb alignment and marker reconstruction (2009 paper, sections 3.4-3.5)."""
+"""From drawings to space: limbs and markers (2009 paper, s3.4-3.5), back-projection and foot contact (2010, s3.1.3)."""
