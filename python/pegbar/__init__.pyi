@@ -26,6 +26,8 @@ from .layer.volumes import TaperedCylinders as TaperedCylinders
 from .layer.volumes import collision_volumes as collision_volumes
 from .lift.backprojection import back_project as back_project
 from .lift.hidden import fill_hidden as fill_hidden
+from .lift.limbs import align_limbs as align_limbs
+from .lift.markers import reconstruct_markers as reconstruct_markers
 from .scene.camera import PerspectiveCamera as PerspectiveCamera
 from .scene.contacts import foot_contacts as foot_contacts
 from .scene.drawing import Drawing as Drawing

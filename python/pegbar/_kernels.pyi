@@ -14,6 +14,7 @@ __all__ = [
     "grow_labels",
     "has_alpha",
     "ink_alpha",
+    "lift_markers",
     "limb_depth",
     "matte",
     "own_alpha",
@@ -45,6 +46,14 @@ def depth_composite(
 def limb_depth(
     labels: NDArray[np.uint8], ends: NDArray[np.float64], end_depths: NDArray[np.float64], perspective: bool
 ) -> NDArray[np.float32]: ...
+def lift_markers(
+    projection: NDArray[np.float64],
+    limbs: NDArray[np.int64],
+    lengths: NDArray[np.float64],
+    prior: NDArray[np.float64],
+    weights: tuple[float, float],
+    subspace: tuple[NDArray[np.float64], NDArray[np.float64]],
+) -> NDArray[np.float64]: ...
 def segment_stick_figure(
     gray: NDArray[np.uint8], ends: NDArray[np.float64], half_widths: NDArray[np.float64], threshold: int
 ) -> NDArray[np.uint8]: ...

@@ -9,6 +9,7 @@ mod errors;
 mod grow;
 mod holdout;
 mod kinematics;
+mod lift;
 mod matte;
 mod paint;
 mod palette;
@@ -36,6 +37,8 @@ mod _kernels {
     use crate::holdout::composite_matte;
     #[pymodule_export]
     use crate::kinematics::forward_kinematics;
+    #[pymodule_export]
+    use crate::lift::lift_markers;
     #[pymodule_export]
     use crate::matte::{fill_matte, has_alpha, ink_alpha, matte, own_alpha};
     #[pymodule_export]

@@ -15,6 +15,7 @@ pub mod holdout;
 pub mod ink;
 pub mod kinematics;
 pub mod lanes;
+pub mod lift;
 pub mod matte;
 pub mod paint;
 pub mod palette;
