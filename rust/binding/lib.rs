@@ -1,6 +1,7 @@
 //! `pegbar._kernels`: registers the wrappers; each file carries its kernel's name.
 
 mod arrays;
+mod bvh;
 mod color;
 mod composite;
 mod depth;
@@ -8,9 +9,12 @@ mod descriptor;
 mod errors;
 mod grow;
 mod holdout;
+mod kinematics;
+mod lift;
 mod matte;
 mod paint;
 mod palette;
+mod pose;
 mod raster;
 mod rim;
 mod segment;
@@ -21,6 +25,8 @@ use pyo3::prelude::*;
 /// The Rust kernels of pegbar. Strict and private: call the functions of the `pegbar` package instead.
 #[pymodule(gil_used = false)]
 mod _kernels {
+    #[pymodule_export]
+    use crate::bvh::parse_bvh;
     #[pymodule_export]
     use crate::color::convert_srgb;
     #[pymodule_export]
@@ -34,11 +40,17 @@ mod _kernels {
     #[pymodule_export]
     use crate::holdout::composite_matte;
     #[pymodule_export]
+    use crate::kinematics::forward_kinematics;
+    #[pymodule_export]
+    use crate::lift::lift_markers;
+    #[pymodule_export]
     use crate::matte::{fill_matte, has_alpha, ink_alpha, matte, own_alpha};
     #[pymodule_export]
     use crate::paint::{fill_polygon, stroke_polyline, unpremultiply};
     #[pymodule_export]
     use crate::palette::palette_labels;
+    #[pymodule_export]
+    use crate::pose::fit_poses;
     #[pymodule_export]
     use crate::raster::{render_passes, resolve_passes};
     #[pymodule_export]

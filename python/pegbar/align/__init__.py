@@ -1,1 +1,1 @@
-"""Which frames of a clip go with which drawn frames, and from where the clip is seen."""
+"""Finding the clip's time, view and camera for a drawing: descriptors, time warp, search, pose, registration."""
