@@ -1,1 +1,1 @@
-"""From drawn joints and a clip to cameras: which frames belong together, and from where the artist saw the motion."""
+"""Finding the clip's time, view and camera for a drawing: descriptors, time warp, search, pose, registration."""
