@@ -22,6 +22,9 @@ from .layer.segmentation import segment_stick_figure as segment_stick_figure
 from .layer.volumes import TaperedCylinders as TaperedCylinders
 from .layer.volumes import collision_volumes as collision_volumes
 from .lift.backprojection import back_project as back_project
+from .lift.contact import ContactNoise as ContactNoise
+from .lift.contact import GroundedDepths as GroundedDepths
+from .lift.contact import ground_depths as ground_depths
 from .lift.hidden import fill_hidden as fill_hidden
 from .scene.camera import PerspectiveCamera as PerspectiveCamera
 from .scene.contacts import foot_contacts as foot_contacts
