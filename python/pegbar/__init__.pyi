@@ -1,7 +1,14 @@
+from .align.descriptor import pose_descriptor as pose_descriptor
+from .align.descriptor import pose_distance as pose_distance
+from .align.timewarp import TimeWarp as TimeWarp
+from .align.timewarp import time_warp as time_warp
 from .align.camera_track import CameraTrack as CameraTrack
+from .align.pose import fit_pose as fit_pose
+from .align.pose_fit import PoseFit as PoseFit
 from .align.registration import register_cameras as register_cameras
 from .errors import DegenerateError as DegenerateError
 from .errors import FormatError as FormatError
+from .errors import MissingExtraError as MissingExtraError
 from .errors import MissingFrameError as MissingFrameError
 from .errors import PegbarError as PegbarError
 from .errors import ShotError as ShotError
@@ -26,6 +33,8 @@ from .lift.contact import ContactNoise as ContactNoise
 from .lift.contact import GroundedDepths as GroundedDepths
 from .lift.contact import ground_depths as ground_depths
 from .lift.hidden import fill_hidden as fill_hidden
+from .lift.limbs import align_limbs as align_limbs
+from .lift.markers import reconstruct_markers as reconstruct_markers
 from .scene.camera import PerspectiveCamera as PerspectiveCamera
 from .scene.contacts import foot_contacts as foot_contacts
 from .scene.drawing import Drawing as Drawing

@@ -144,7 +144,7 @@ class Motion:
 
     def _offset(self, joint: int, above: int) -> Floats:
         """Where ``joint`` is in the axes of ``above`` in the first frame, (3,); differences of rounding are 0."""
-        apart: Floats = self.rotations[0, above].T @ (self.positions[0, joint] - self.positions[0, above])
+        apart = self.rotations[0, above].T @ (self.positions[0, joint] - self.positions[0, above])
         return apart if np.abs(apart).max() > 1e-6 else np.zeros(3)
 
     def _tip(self, joint: int) -> Floats:
