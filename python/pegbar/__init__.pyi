@@ -1,11 +1,11 @@
+from .align.camera_track import CameraTrack as CameraTrack
 from .align.descriptor import pose_descriptor as pose_descriptor
 from .align.descriptor import pose_distance as pose_distance
-from .align.timewarp import TimeWarp as TimeWarp
-from .align.timewarp import time_warp as time_warp
-from .align.camera_track import CameraTrack as CameraTrack
 from .align.pose import fit_pose as fit_pose
 from .align.pose_fit import PoseFit as PoseFit
 from .align.registration import register_cameras as register_cameras
+from .align.timewarp import TimeWarp as TimeWarp
+from .align.timewarp import time_warp as time_warp
 from .errors import DegenerateError as DegenerateError
 from .errors import FormatError as FormatError
 from .errors import MissingExtraError as MissingExtraError
@@ -14,6 +14,9 @@ from .errors import PegbarError as PegbarError
 from .errors import ShotError as ShotError
 from .io.annotations import read_annotations as read_annotations
 from .io.annotations_writer import write_annotations as write_annotations
+from .io.joint_map import read_joint_map as read_joint_map
+from .io.joint_map import write_joint_map as write_joint_map
+from .io.motion import read_motion as read_motion
 from .layer.composite import depth_composite as depth_composite
 from .layer.composite import holdout_matte as holdout_matte
 from .layer.composite import visible_matte as visible_matte
@@ -36,6 +39,7 @@ from .lift.hidden import fill_hidden as fill_hidden
 from .lift.limbs import align_limbs as align_limbs
 from .lift.markers import reconstruct_markers as reconstruct_markers
 from .scene.camera import PerspectiveCamera as PerspectiveCamera
+from .scene.clip_report import ClipReport as ClipReport
 from .scene.contacts import foot_contacts as foot_contacts
 from .scene.drawing import Drawing as Drawing
 from .scene.drawing import Limb as Limb
