@@ -4,6 +4,17 @@ from .align.descriptor import pose_distance as pose_distance
 from .align.pose import fit_pose as fit_pose
 from .align.pose_fit import PoseFit as PoseFit
 from .align.registration import register_cameras as register_cameras
+from .align.descriptor import limb_trust as limb_trust
+from .align.descriptor import pose_descriptor as pose_descriptor
+from .align.descriptor import pose_distance as pose_distance
+from .align.pace import RootSpeeds as RootSpeeds
+from .align.pace import film_times as film_times
+from .align.pace import root_speeds as root_speeds
+from .align.pose import fit_pose as fit_pose
+from .align.pose_fit import PoseFit as PoseFit
+from .align.registration import register_cameras as register_cameras
+from .align.retime import retime as retime
+from .align.retime import sample_markers as sample_markers
 from .align.timewarp import TimeWarp as TimeWarp
 from .align.timewarp import time_warp as time_warp
 from .errors import DegenerateError as DegenerateError
