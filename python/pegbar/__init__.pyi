@@ -43,6 +43,9 @@ from .layer.segmentation import segment_stick_figure as segment_stick_figure
 from .layer.volumes import TaperedCylinders as TaperedCylinders
 from .layer.volumes import collision_volumes as collision_volumes
 from .lift.backprojection import back_project as back_project
+from .lift.contact import ContactNoise as ContactNoise
+from .lift.contact import GroundedDepths as GroundedDepths
+from .lift.contact import ground_depths as ground_depths
 from .lift.hidden import fill_hidden as fill_hidden
 from .lift.limbs import align_limbs as align_limbs
 from .lift.markers import reconstruct_markers as reconstruct_markers
