@@ -12,6 +12,7 @@ mod paint;
 mod palette;
 mod raster;
 mod rim;
+mod search;
 mod segment;
 
 use pyo3::prelude::*;
@@ -39,6 +40,8 @@ mod _kernels {
     use crate::raster::{render_passes, resolve_passes};
     #[pymodule_export]
     use crate::rim::rim_depth;
+    #[pymodule_export]
+    use crate::search::{search_clips, segment_path};
     #[pymodule_export]
     use crate::segment::segment_stick_figure;
 }

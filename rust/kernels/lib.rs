@@ -18,6 +18,7 @@ pub mod palette;
 pub mod raster;
 pub mod resolve;
 pub mod rim;
+pub mod search;
 pub mod segment;
 mod settle;
 pub mod shade;
