@@ -11,7 +11,7 @@ from importlib.metadata import version
 
 from cyclopts import App, CycloptsError
 
-from pegbar.errors import describe
+from pegbar.errors import MissingExtraError, describe
 
 app = App(
     name="pegbar",
@@ -62,7 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
     except CycloptsError as error:
         return _fail(f"{error} (see pegbar --help)")
-    except OSError as error:
+    except (OSError, MissingExtraError) as error:
         return _fail(describe(error))
     except ValueError as error:
         return _fail(str(error))

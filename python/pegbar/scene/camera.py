@@ -18,6 +18,21 @@ from pegbar.errors import DegenerateError
 Floats = NDArray[np.float64]
 
 
+def metric(matrices: Floats) -> Floats:
+    """Return cameras ``matrices`` (F, 3, 4) scaled so that their third rows give the depth in metres, none mirrored.
+
+    Raises DegenerateError, naming the frame, where the left 3x3 block is singular.
+    """
+    determinants = np.linalg.det(matrices[:, :, :3])
+    lengths = np.linalg.norm(matrices[:, :, :3], axis=2)
+    singular = ~(np.abs(determinants) > 1e-12 * np.prod(lengths, axis=1))
+    if singular.any():
+        frame = int(np.argmax(singular))
+        raise DegenerateError(f"matrices: frame {frame}: the left 3x3 block is singular, so it is no finite camera")
+    scaled: Floats = matrices * (np.sign(determinants) / lengths[:, 2])[:, None, None]
+    return scaled
+
+
 class PerspectiveCamera:
     """A pinhole camera with a picture size.
 
@@ -40,11 +55,10 @@ class PerspectiveCamera:
     def __init__(self, matrix: ArrayLike, image_size: ArrayLike) -> None:
         raw = arrays.floats("matrix", matrix, (3, 4))
         size = arrays.integers("image_size", image_size, (2,), low=1)
-        determinant = np.linalg.det(raw[:, :3])
-        scale = np.linalg.norm(raw[2, :3])
-        if not abs(determinant) > 1e-12 * np.prod(np.linalg.norm(raw[:, :3], axis=1)):
-            raise DegenerateError("matrix: its left 3x3 block is singular, so it is no finite camera")
-        self.matrix: Floats = raw * (np.sign(determinant) / scale)
+        try:
+            self.matrix: Floats = metric(raw[None])[0]
+        except DegenerateError:
+            raise DegenerateError("matrix: its left 3x3 block is singular, so it is no finite camera") from None
         self.matrix.flags.writeable = False
         self.image_size: tuple[int, int] = (int(size[0]), int(size[1]))
 

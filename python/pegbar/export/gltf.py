@@ -1,0 +1,152 @@
+"""A motion as binary glTF: a skinned figure of capsules that viewers, Blender and game engines play."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+import pygltflib as gltf
+from numpy.typing import ArrayLike, NDArray
+
+from pegbar import arrays
+from pegbar.export.rig import Rig, rig
+from pegbar.scene.motion import Motion
+
+Floats = NDArray[np.float64]
+_KINDS = {
+    np.dtype(np.float32): gltf.FLOAT,
+    np.dtype(np.uint16): gltf.UNSIGNED_SHORT,
+    np.dtype(np.uint32): gltf.UNSIGNED_INT,
+}
+_SHAPES = {(): gltf.SCALAR, (3,): gltf.VEC3, (4,): gltf.VEC4, (4, 4): gltf.MAT4}
+
+
+def glb(
+    motion: Motion,
+    *,
+    times: ArrayLike | None = None,
+    interpolation: Literal["linear", "step"] = "linear",
+    name: str = "motion",
+) -> bytes:
+    """Return ``motion`` as a .glb file: joints, animation, and a skinned figure of capsules; metres, Y up.
+
+    Joints keep the motion's names. A bone that changes its length moves its child joint and stretches its capsule.
+
+    Parameters
+    ----------
+    motion : Motion
+        A skeleton in motion.
+    times : (F,) float, optional
+        When each frame is shown, in seconds, rising. None: ``motion.frame_rate``.
+    interpolation : {"linear", "step"}
+        What happens between frames: "step" holds the pose, as drawings on twos do.
+    name : str
+        Of the animation and the figure.
+
+    Returns
+    -------
+    bytes
+        The file.
+
+    Raises
+    ------
+    ValueError
+        For a motion without skeleton or frames, or times that do not rise.
+    """
+    bones = rig(motion)
+    writer = _Writer(interpolation.upper(), name)
+    _joints(writer, bones, _seconds(motion, times))
+    _skin(writer, bones)
+    document, roots = writer.document, [joint for joint, parent in enumerate(bones.parents) if parent < 0]
+    document.nodes.append(gltf.Node(name=name, mesh=0, skin=0))
+    document.scenes.append(gltf.Scene(name=name, nodes=[*roots, len(document.nodes) - 1]))
+    document.scene = 0
+    return writer.finish()
+
+
+class _Writer:
+    """Collects arrays into one buffer and channels into one animation."""
+
+    def __init__(self, interpolation: str, name: str) -> None:
+        self.document = gltf.GLTF2(asset=gltf.Asset(version="2.0", generator="pegbar"))
+        self.document.animations.append(gltf.Animation(name=name))
+        self.interpolation = interpolation
+        self._data = bytearray()
+
+    def array(self, values: NDArray[np.generic], *, bounds: bool = False) -> int:
+        """Store ``values`` (n, ...) and return the index of its accessor."""
+        document, values = self.document, np.ascontiguousarray(values)
+        document.bufferViews.append(gltf.BufferView(buffer=0, byteOffset=len(self._data), byteLength=values.nbytes))
+        accessor = gltf.Accessor(
+            bufferView=len(document.bufferViews) - 1,
+            componentType=_KINDS[values.dtype],
+            count=len(values),
+            type=_SHAPES[values.shape[1:]],
+        )
+        if bounds:
+            flat = values.reshape(len(values), -1)
+            accessor.min, accessor.max = flat.min(0).tolist(), flat.max(0).tolist()
+        document.accessors.append(accessor)
+        self._data += values.tobytes()
+        self._data += b"\0" * (-len(self._data) % 4)
+        return len(document.accessors) - 1
+
+    def animate(self, node: int, path: str, seconds: int, values: Floats) -> None:
+        """Let ``path`` of ``node`` follow ``values`` (F, ...) at the times of accessor ``seconds``."""
+        animation = self.document.animations[0]
+        output = self.array(values.astype(np.float32))
+        sampler = gltf.AnimationSampler(input=seconds, output=output, interpolation=self.interpolation)
+        target = gltf.AnimationChannelTarget(node=node, path=path)
+        animation.samplers.append(sampler)
+        animation.channels.append(gltf.AnimationChannel(sampler=len(animation.samplers) - 1, target=target))
+
+    def finish(self) -> bytes:
+        """Return the file."""
+        self.document.buffers.append(gltf.Buffer(byteLength=len(self._data)))
+        self.document.set_binary_blob(bytes(self._data))
+        return b"".join(self.document.save_to_bytes())
+
+
+def _seconds(motion: Motion, times: ArrayLike | None) -> NDArray[np.float32]:
+    frames = len(motion.positions)
+    given = np.arange(frames) / motion.frame_rate if times is None else times
+    seconds: NDArray[np.float32] = arrays.floats("times", given, (frames,)).astype(np.float32)
+    if (np.diff(seconds) <= 0).any() or seconds[0] < 0:
+        raise ValueError("times: want seconds from 0 on that rise from frame to frame")
+    return seconds
+
+
+def _joints(writer: _Writer, bones: Rig, seconds: NDArray[np.float32]) -> None:
+    """Add a node a joint and let it move."""
+    clock = writer.array(seconds, bounds=True)
+    for joint, label in enumerate(bones.names):
+        offset, turn, scale = bones.translations[:, joint], bones.quaternions[:, joint], bones.scales[:, joint]
+        children = [child for child, parent in enumerate(bones.parents) if parent == joint]
+        node = gltf.Node(name=label, translation=offset[0].tolist(), rotation=turn[0].tolist(), children=children)
+        writer.document.nodes.append(node)
+        writer.animate(joint, "rotation", clock, turn)
+        if bones.moves[joint]:
+            writer.animate(joint, "translation", clock, offset)
+        if bones.scaled[joint]:
+            writer.animate(joint, "scale", clock, scale)
+
+
+def _skin(writer: _Writer, bones: Rig) -> None:
+    """Add mesh and skin: every vertex hangs on one joint alone."""
+    document, figure = writer.document, bones.figure
+    slots = np.zeros((len(figure.vertices), 4), np.uint16)
+    slots[:, 0] = bones.carrier
+    attributes = gltf.Attributes(
+        POSITION=writer.array(figure.vertices.astype(np.float32), bounds=True),
+        NORMAL=writer.array(figure.normals.astype(np.float32)),
+        JOINTS_0=writer.array(slots),
+        WEIGHTS_0=writer.array(np.tile(np.array([1, 0, 0, 0], np.float32), (len(slots), 1))),
+    )
+    indices = writer.array(figure.triangles.astype(np.uint32).reshape(-1))
+    # glTF stores matrices column by column.
+    inverse = np.linalg.inv(bones.bind).transpose(0, 2, 1).astype(np.float32)
+    document.skins.append(gltf.Skin(joints=list(range(len(bones.names))), inverseBindMatrices=writer.array(inverse)))
+    paint = gltf.PbrMetallicRoughness(baseColorFactor=[0.8, 0.75, 0.7, 1.0], metallicFactor=0.0, roughnessFactor=0.8)
+    document.materials.append(gltf.Material(name="figure", pbrMetallicRoughness=paint))
+    primitive = gltf.Primitive(attributes=attributes, indices=indices, material=0)
+    document.meshes.append(gltf.Mesh(name="figure", primitives=[primitive]))
