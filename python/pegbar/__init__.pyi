@@ -14,6 +14,9 @@ from .errors import PegbarError as PegbarError
 from .errors import ShotError as ShotError
 from .io.annotations import read_annotations as read_annotations
 from .io.annotations_writer import write_annotations as write_annotations
+from .io.joint_map import read_joint_map as read_joint_map
+from .io.joint_map import write_joint_map as write_joint_map
+from .io.motion import read_motion as read_motion
 from .layer.composite import depth_composite as depth_composite
 from .layer.composite import holdout_matte as holdout_matte
 from .layer.composite import visible_matte as visible_matte
@@ -34,6 +37,7 @@ from .lift.limbs import align_limbs as align_limbs
 from .lift.markers import reconstruct_markers as reconstruct_markers
 from .scene.camera import PerspectiveCamera as PerspectiveCamera
 from .scene.contacts import foot_contacts as foot_contacts
+from .scene.clip_report import ClipReport as ClipReport
 from .scene.drawing import Drawing as Drawing
 from .scene.drawing import Limb as Limb
 from .scene.joints import map_joints as map_joints
