@@ -1,11 +1,11 @@
+from .align.camera_track import CameraTrack as CameraTrack
 from .align.descriptor import pose_descriptor as pose_descriptor
 from .align.descriptor import pose_distance as pose_distance
-from .align.timewarp import TimeWarp as TimeWarp
-from .align.timewarp import time_warp as time_warp
-from .align.camera_track import CameraTrack as CameraTrack
 from .align.pose import fit_pose as fit_pose
 from .align.pose_fit import PoseFit as PoseFit
 from .align.registration import register_cameras as register_cameras
+from .align.timewarp import TimeWarp as TimeWarp
+from .align.timewarp import time_warp as time_warp
 from .errors import DegenerateError as DegenerateError
 from .errors import FormatError as FormatError
 from .errors import MissingExtraError as MissingExtraError

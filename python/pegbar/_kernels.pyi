@@ -19,6 +19,7 @@ __all__ = [
     "matte",
     "own_alpha",
     "palette_labels",
+    "parse_amc",
     "parse_bvh",
     "pose_distance",
     "render_passes",
@@ -100,6 +101,7 @@ def composite_matte(
     scale: int,
 ) -> NDArray[np.float32]: ...
 def rim_depth(rendered: NDArray[Any], rendered_depth: NDArray[np.float32]) -> NDArray[np.float32] | None: ...
+def parse_amc(path: str, text: bytes, bones: list[tuple[str, int]]) -> tuple[list[str], int, int, _Doubles]: ...
 def parse_bvh(
     path: str, text: bytes
 ) -> tuple[

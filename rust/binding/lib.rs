@@ -1,5 +1,6 @@
 //! `pegbar._kernels`: registers the wrappers; each file carries its kernel's name.
 
+mod amc;
 mod arrays;
 mod bvh;
 mod color;
@@ -26,6 +27,8 @@ use pyo3::prelude::*;
 /// The Rust kernels of pegbar. Strict and private: call the functions of the `pegbar` package instead.
 #[pymodule(gil_used = false)]
 mod _kernels {
+    #[pymodule_export]
+    use crate::amc::parse_amc;
     #[pymodule_export]
     use crate::bvh::parse_bvh;
     #[pymodule_export]

@@ -1,5 +1,6 @@
 //! The pure kernels of pegbar, one file each, without Python. This file names the modules and defines nothing.
 
+pub mod amc;
 pub mod band;
 pub mod bvh;
 pub mod checks;

@@ -84,6 +84,19 @@ impl<'a> Words<'a> {
         rest[..length].trim_ascii()
     }
 
+    /// The next line that holds something besides white space and a comment, which `#` begins; None at the end.
+    #[inline]
+    pub fn line(&mut self) -> Option<&'a [u8]> {
+        loop {
+            self.peek()?;
+            let line = self.rest_of_line();
+            let bare = line.split(|byte| *byte == b'#').next().unwrap_or_default();
+            if !bare.is_empty() {
+                return Some(bare.trim_ascii_end());
+            }
+        }
+    }
+
     /// The next word as a finite number.
     #[inline]
     pub fn number(&mut self) -> Result<f64, TextError> {
@@ -131,7 +144,7 @@ fn line(text: &[u8], place: usize) -> usize {
 
 /// The word as a number, rounded as `str::parse` does; not finite ones are refused.
 #[inline]
-fn number(word: &[u8]) -> Result<f64, String> {
+pub fn number(word: &[u8]) -> Result<f64, String> {
     let value = match plain_number(word) {
         Some(value) => value,
         None => {
@@ -205,6 +218,12 @@ mod tests {
         let text = b"a\nb\r\nc\rd\n\re";
         let lines: Vec<usize> = [0, 2, 5, 7, 10].map(|place| line(text, place)).to_vec();
         assert_eq!(lines, [1, 2, 3, 4, 6]);
+    }
+
+    #[test]
+    fn lines_are_bare_of_comments() {
+        let mut words = Words::new(b"# head\r\n a b # c\n\n #\rd");
+        assert_eq!([words.line(), words.line(), words.line()], [Some(b"a b".as_slice()), Some(b"d"), None]);
     }
 
     #[test]

@@ -52,14 +52,38 @@ Reads the joint marks and every BVH, AMC and C3D file in a folder and the folder
 a table, and says so when nothing fits. Left and right mixed up in the drawing, and mirrored motions, are found too.
 
 Example: pegbar match my_shot/annotation.json mocap -o my_shot/match --write my_shot/shot.toml""",
+    "motion": """Look at motion capture clips.""",
     "demo": """Make a sample shot from nothing and run every stage on it.
 
 A drawn dancer with a hoop and a ribbon.
 
 Example: pegbar demo demo""",
 }
+#: Commands that are groups of commands: these are in the group's module.
+GROUPS = {
+    "motion": {
+        "info": """Print what clips hold and how they were understood.
+
+Frames, rate, unit, up axis, floor, facing, an inserted T-pose, joints found and missing. A clip that cannot be read is
+named and the others are still shown; the exit code is then 1.
+
+Example: pegbar motion info clips/*.bvh
+
+Example: pegbar motion info walk.bvh --joints walk.toml""",
+        "plot": """Draw poses of a clip from the front, the side and above.
+
+Left is blue and right is red, later poses are darker; the line is the floor, the grid is in metres.
+
+Example: pegbar motion plot walk.bvh -o walk.png --frames 1-120x20""",
+    }
+}
 for command, text in COMMANDS.items():
-    app.command(f"pegbar.cli.{command}:{command}", name=command, help=text)
+    if command in GROUPS:
+        app.command(App(name=command, help=text))
+        for name, help_text in GROUPS[command].items():
+            app[command].command(f"pegbar.cli.{command}:{name}", name=name, help=help_text)
+    else:
+        app.command(f"pegbar.cli.{command}:{command}", name=command, help=text)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

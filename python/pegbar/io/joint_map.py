@@ -7,6 +7,7 @@ import os
 import re
 import tomllib
 from collections.abc import Collection, Mapping
+from difflib import get_close_matches
 from pathlib import Path
 
 from pegbar.errors import FormatError
@@ -75,6 +76,13 @@ def read_joint_map(path: str | os.PathLike[str], names: Collection[str] | None =
         For text that is not TOML, a marker that is unknown or a joint that the clip does not have, with its line.
     OSError
         When the file cannot be read.
+
+    Examples
+    --------
+    >>> _ = Path("walk.toml").write_text('pelvis = "Hips"')
+    >>> read_joint_map("walk.toml", ["Hips", "Spine"])
+    {'pelvis': 'Hips'}
+    >>> Path("walk.toml").unlink()
     """
     try:
         text = Path(path).read_text(encoding="utf-8")
@@ -93,8 +101,6 @@ def read_joint_map(path: str | os.PathLike[str], names: Collection[str] | None =
 
 def wrong_entry(marker: str, joint: object, names: Collection[str] | None) -> str:
     """Return what is wrong with one line of a mapping, or ""."""
-    from difflib import get_close_matches
-
     if marker not in _KNOWN:
         near = get_close_matches(marker, _KNOWN, 1)
         return f"no marker is called {marker!r}{f' (did you mean {near[0]!r}?)' if near else ''}"

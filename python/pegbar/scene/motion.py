@@ -145,8 +145,9 @@ class Motion:
         place = self.names.index(joint)
         kind = name.split("_")[-1]
         if centres and (kind == "head" or (kind == "hand" and self._at_wrist(name, place))):
-            return self.positions[:, place] + np.einsum("fij,j->fi", self.rotations[:, place], self._tip(place)) / 2
-        return self.positions[:, place]
+            half: Floats = np.einsum("fij,j->fi", self.rotations[:, place], self._tip(place)) / 2
+            return half + self.positions[:, place]
+        return np.asarray(self.positions[:, place], np.float64)
 
     def _at_wrist(self, hand: str, place: int) -> bool:
         """Whether the forearm ends at the hand's joint."""
