@@ -50,8 +50,8 @@ from .lift.hidden import fill_hidden as fill_hidden
 from .lift.limbs import align_limbs as align_limbs
 from .lift.markers import reconstruct_markers as reconstruct_markers
 from .scene.camera import PerspectiveCamera as PerspectiveCamera
-from .scene.clip_report import ClipReport as ClipReport
 from .scene.contacts import foot_contacts as foot_contacts
+from .scene.clip_report import ClipReport as ClipReport
 from .scene.drawing import Drawing as Drawing
 from .scene.drawing import Limb as Limb
 from .scene.joints import map_joints as map_joints

@@ -26,6 +26,7 @@ pub mod pose;
 pub mod raster;
 pub mod resolve;
 pub mod rim;
+pub mod search;
 pub mod robust;
 pub mod segment;
 mod settle;
