@@ -10,11 +10,6 @@ from .align.pose_fit import PoseFit as PoseFit
 from .align.registration import register_cameras as register_cameras
 from .align.retime import retime as retime
 from .align.retime import sample_markers as sample_markers
-from .align.descriptor import pose_descriptor as pose_descriptor
-from .align.descriptor import pose_distance as pose_distance
-from .align.pose import fit_pose as fit_pose
-from .align.pose_fit import PoseFit as PoseFit
-from .align.registration import register_cameras as register_cameras
 from .align.timewarp import TimeWarp as TimeWarp
 from .align.timewarp import time_warp as time_warp
 from .errors import DegenerateError as DegenerateError
@@ -50,8 +45,8 @@ from .lift.hidden import fill_hidden as fill_hidden
 from .lift.limbs import align_limbs as align_limbs
 from .lift.markers import reconstruct_markers as reconstruct_markers
 from .scene.camera import PerspectiveCamera as PerspectiveCamera
-from .scene.contacts import foot_contacts as foot_contacts
 from .scene.clip_report import ClipReport as ClipReport
+from .scene.contacts import foot_contacts as foot_contacts
 from .scene.drawing import Drawing as Drawing
 from .scene.drawing import Limb as Limb
 from .scene.joints import map_joints as map_joints
