@@ -189,7 +189,7 @@ def _frames(path: _Path, parameters: Parameters, first: int, last: int) -> int:
     most = max(said.values())
     for who, count in said.items():
         # In a longer clip a count of 16 bits is cut off or stands at its limit.
-        is_short = most > 0x7FFF and ((most - count) % 0x10000 == 0 or count in (0x7FFF, 0xFFFF))
+        is_short = most > 0x7FFF and ((most - count) % 0x10000 == 0 or count & 0xFFFF in (0x7FFF, 0xFFFF))
         if count != most and not is_short and (who, last) != ("the header", 0xFFFF):
             listed = ", ".join(f"{name} {number}" for name, number in said.items())
             raise FormatError(path, f"the counts of frames disagree: {listed}", byte=6)
