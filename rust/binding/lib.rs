@@ -1,19 +1,26 @@
 //! `pegbar._kernels`: registers the wrappers; each file carries its kernel's name.
 
+mod amc;
 mod arrays;
+mod bvh;
 mod color;
 mod composite;
 mod depth;
+mod descriptor;
 mod errors;
 mod grow;
 mod holdout;
+mod kinematics;
+mod lift;
 mod matte;
 mod paint;
 mod palette;
 mod pose;
 mod raster;
 mod rim;
+mod search;
 mod segment;
+mod warp;
 
 use pyo3::prelude::*;
 
@@ -21,15 +28,25 @@ use pyo3::prelude::*;
 #[pymodule(gil_used = false)]
 mod _kernels {
     #[pymodule_export]
+    use crate::amc::parse_amc;
+    #[pymodule_export]
+    use crate::bvh::parse_bvh;
+    #[pymodule_export]
     use crate::color::convert_srgb;
     #[pymodule_export]
     use crate::composite::depth_composite;
     #[pymodule_export]
     use crate::depth::limb_depth;
     #[pymodule_export]
+    use crate::descriptor::pose_distance;
+    #[pymodule_export]
     use crate::grow::grow_labels;
     #[pymodule_export]
     use crate::holdout::composite_matte;
+    #[pymodule_export]
+    use crate::kinematics::forward_kinematics;
+    #[pymodule_export]
+    use crate::lift::lift_markers;
     #[pymodule_export]
     use crate::matte::{fill_matte, has_alpha, ink_alpha, matte, own_alpha};
     #[pymodule_export]
@@ -43,5 +60,9 @@ mod _kernels {
     #[pymodule_export]
     use crate::rim::rim_depth;
     #[pymodule_export]
+    use crate::search::{search_clips, segment_path};
+    #[pymodule_export]
     use crate::segment::segment_stick_figure;
+    #[pymodule_export]
+    use crate::warp::time_warp;
 }
