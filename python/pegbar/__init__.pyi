@@ -1,9 +1,4 @@
 from .align.camera_track import CameraTrack as CameraTrack
-from .align.descriptor import pose_descriptor as pose_descriptor
-from .align.descriptor import pose_distance as pose_distance
-from .align.pose import fit_pose as fit_pose
-from .align.pose_fit import PoseFit as PoseFit
-from .align.registration import register_cameras as register_cameras
 from .align.descriptor import limb_trust as limb_trust
 from .align.descriptor import pose_descriptor as pose_descriptor
 from .align.descriptor import pose_distance as pose_distance

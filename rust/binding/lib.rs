@@ -18,6 +18,7 @@ mod palette;
 mod pose;
 mod raster;
 mod rim;
+mod search;
 mod segment;
 mod warp;
 
@@ -58,6 +59,8 @@ mod _kernels {
     use crate::raster::{render_passes, resolve_passes};
     #[pymodule_export]
     use crate::rim::rim_depth;
+    #[pymodule_export]
+    use crate::search::{search_clips, segment_path};
     #[pymodule_export]
     use crate::segment::segment_stick_figure;
     #[pymodule_export]

@@ -27,6 +27,7 @@ pub mod raster;
 pub mod resolve;
 pub mod rim;
 pub mod robust;
+pub mod search;
 pub mod segment;
 mod settle;
 pub mod shade;

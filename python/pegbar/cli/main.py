@@ -46,6 +46,12 @@ at least --drawings, --beauty and --output, and --drawing-depth or --labels with
 Example: pegbar composite my_shot/shot.toml --frames 1-48 --keep-going
 
 Example: pegbar composite --drawings d.####.png --drawing-depth z.####.exr --beauty b.####.exr --output o.####.png""",
+    "match": """Find the clip that a drawn sequence is like: which frames, at which time, seen from where.
+
+Reads the joint marks and every BVH, AMC and C3D file in a folder and the folders below; nothing needs to be set. Prints
+a table, and says so when nothing fits. Left and right mixed up in the drawing, and mirrored motions, are found too.
+
+Example: pegbar match my_shot/annotation.json mocap -o my_shot/match --write my_shot/shot.toml""",
     "motion": """Look at motion capture clips.""",
     "demo": """Make a sample shot from nothing and run every stage on it.
 
