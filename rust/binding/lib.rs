@@ -14,6 +14,7 @@ mod palette;
 mod raster;
 mod rim;
 mod segment;
+mod signs;
 
 use pyo3::prelude::*;
 
@@ -44,4 +45,6 @@ mod _kernels {
     use crate::rim::rim_depth;
     #[pymodule_export]
     use crate::segment::segment_stick_figure;
+    #[pymodule_export]
+    use crate::signs::{length_costs, limb_depths};
 }

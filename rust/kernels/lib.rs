@@ -22,4 +22,5 @@ pub mod rim;
 pub mod segment;
 mod settle;
 pub mod shade;
+pub mod signs;
 pub mod surface;
