@@ -9,6 +9,8 @@ __all__ = [
     "depth_composite",
     "fill_matte",
     "fill_polygon",
+    "fit_poses",
+    "forward_kinematics",
     "grow_labels",
     "has_alpha",
     "ink_alpha",
@@ -19,11 +21,15 @@ __all__ = [
     "matte",
     "own_alpha",
     "palette_labels",
+    "parse_amc",
+    "parse_bvh",
+    "pose_distance",
     "render_passes",
     "resolve_passes",
     "rim_depth",
     "segment_stick_figure",
     "stroke_polyline",
+    "time_warp",
     "unpremultiply",
 ]
 
@@ -103,3 +109,21 @@ def composite_matte(
     scale: int,
 ) -> NDArray[np.float32]: ...
 def rim_depth(rendered: NDArray[Any], rendered_depth: NDArray[np.float32]) -> NDArray[np.float32] | None: ...
+def parse_amc(path: str, text: bytes, bones: list[tuple[str, int]]) -> tuple[list[str], int, int, _Doubles]: ...
+def parse_bvh(
+    path: str, text: bytes
+) -> tuple[
+    tuple[list[str], list[int], _Doubles, list[int], _Doubles], tuple[list[int], NDArray[np.uint8], float, _Doubles]
+]: ...
+def forward_kinematics(
+    joints: tuple[list[int], _Doubles, _Doubles, list[int], NDArray[np.uint8]], values: _Doubles, angle: float
+) -> tuple[_Doubles, _Doubles]: ...
+def fit_poses(
+    joints: _Doubles,
+    poses: _Doubles,
+    options: tuple[list[float], float, float | None, float, str, float, int],
+) -> tuple[_Doubles, _Doubles, _Doubles]: ...
+def pose_distance(a: _Doubles, b: _Doubles, weights: _Doubles, a_trust: _Doubles, b_trust: _Doubles) -> _Doubles: ...
+def time_warp(
+    cost: _Doubles, open_begin: bool, open_end: bool, slope_limit: int | None
+) -> tuple[float, NDArray[np.int64]]: ...

@@ -51,3 +51,10 @@ class ShotError(PegbarError, ValueError):
     def __init__(self, problems: list[str]) -> None:
         self.problems = problems
         super().__init__("\n".join(problems))
+
+
+class MissingExtraError(PegbarError, ImportError):
+    """A library that is not installed, since only some users want it; the message says how to install it."""
+
+    def __init__(self, purpose: str, extra: str) -> None:
+        super().__init__(f'{purpose} needs a library that is not installed: pip install "pegbar[{extra}]"')

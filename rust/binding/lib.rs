@@ -1,20 +1,27 @@
 //! `pegbar._kernels`: registers the wrappers; each file carries its kernel's name.
 
+mod amc;
 mod arrays;
+mod bvh;
 mod color;
 mod composite;
 mod depth;
+mod descriptor;
 mod errors;
 mod grow;
 mod holdout;
+mod kinematics;
 mod lift;
 mod matte;
 mod paint;
 mod palette;
+mod pose;
 mod raster;
 mod rim;
+mod search;
 mod segment;
 mod signs;
+mod warp;
 
 use pyo3::prelude::*;
 
@@ -22,15 +29,23 @@ use pyo3::prelude::*;
 #[pymodule(gil_used = false)]
 mod _kernels {
     #[pymodule_export]
+    use crate::amc::parse_amc;
+    #[pymodule_export]
+    use crate::bvh::parse_bvh;
+    #[pymodule_export]
     use crate::color::convert_srgb;
     #[pymodule_export]
     use crate::composite::depth_composite;
     #[pymodule_export]
     use crate::depth::limb_depth;
     #[pymodule_export]
+    use crate::descriptor::pose_distance;
+    #[pymodule_export]
     use crate::grow::grow_labels;
     #[pymodule_export]
     use crate::holdout::composite_matte;
+    #[pymodule_export]
+    use crate::kinematics::forward_kinematics;
     #[pymodule_export]
     use crate::lift::lift_markers;
     #[pymodule_export]
@@ -40,11 +55,17 @@ mod _kernels {
     #[pymodule_export]
     use crate::palette::palette_labels;
     #[pymodule_export]
+    use crate::pose::fit_poses;
+    #[pymodule_export]
     use crate::raster::{render_passes, resolve_passes};
     #[pymodule_export]
     use crate::rim::rim_depth;
     #[pymodule_export]
+    use crate::search::{search_clips, segment_path};
+    #[pymodule_export]
     use crate::segment::segment_stick_figure;
     #[pymodule_export]
     use crate::signs::{length_costs, limb_depths};
+    #[pymodule_export]
+    use crate::warp::time_warp;
 }

@@ -1,26 +1,37 @@
 //! The pure kernels of pegbar, one file each, without Python. This file names the modules and defines nothing.
 
+pub mod amc;
 pub mod band;
+pub mod bvh;
 pub mod checks;
 pub mod clip;
 pub mod color;
 pub mod composite;
 pub mod composite_block;
 pub mod depth;
+pub mod descriptor;
 pub mod error;
 pub mod fill;
 pub mod grow;
 pub mod holdout;
 pub mod ink;
+pub mod kinematics;
+pub mod lanes;
 pub mod lift;
 pub mod matte;
 pub mod paint;
 pub mod palette;
+pub mod pinhole;
+pub mod pose;
 pub mod raster;
 pub mod resolve;
 pub mod rim;
+pub mod robust;
+pub mod search;
 pub mod segment;
 mod settle;
 pub mod shade;
 pub mod signs;
 pub mod surface;
+pub mod warp;
+pub mod words;

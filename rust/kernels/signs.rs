@@ -115,47 +115,72 @@ impl<'a, L: Fn(usize) -> f64> Pass<'a, L> {
         }
         let mut second = self.frame(1);
         let mut cost = [0, 1, 2, 3].map(|pair: usize| first.clip[pair >> 1] + second.clip[pair & 1]);
-        let (least, mut constant) = (self.track.jolt * self.track.jolt, 0.0);
+        let (least, mut constant) = (self.track.jolt * self.track.jolt, Product::default());
         for index in 2..count {
             let third = self.frame(index);
             let noise = third.variance + 4.0 * second.variance + first.variance;
             let spread = least + NOISE_SHARE * noise;
-            constant += NORMALISER * (spread / least).ln();
-            let mut next = [0.0; 4];
+            constant.times(spread / least);
+            // Three signs that are all turned jolt alike: pairs 2 and 3 see those of 1 and 0 with the first sign turned.
+            let jolt = |pair: usize, sign: usize| {
+                let jolt =
+                    signed(third.depth, pair & 1) - 2.0 * signed(second.depth, pair >> 1) + signed(first.depth, sign);
+                2.0 * ((1.0 + jolt * jolt / spread).sqrt() - 1.0)
+            };
+            let jolts = [[jolt(0, 0), jolt(0, 1)], [jolt(1, 0), jolt(1, 1)]];
             let mut choice = 0;
-            for (pair, next) in next.iter_mut().enumerate() {
+            let next = [0, 1, 2, 3].map(|pair: usize| {
                 let (middle, last) = (pair >> 1, pair & 1);
-                let rest = signed(third.depth, last) - 2.0 * signed(second.depth, middle);
-                let through = [0, 1].map(|sign| {
-                    let jolt = rest + signed(first.depth, sign);
-                    cost[sign << 1 | middle] + 2.0 * ((1.0 + jolt * jolt / spread).sqrt() - 1.0)
-                });
-                let better = usize::from(through[1] < through[0]);
-                choice |= (better as u8) << pair;
-                *next = through[better] + third.clip[last];
-            }
+                let [low, high] = if middle == 0 { jolts[pair] } else { [jolts[3 - pair][1], jolts[3 - pair][0]] };
+                let (low, high) = (cost[middle] + low, cost[2 | middle] + high);
+                choice |= u8::from(high < low) << pair;
+                low.min(high) + third.clip[last]
+            });
             if let Some(choices) = choices.as_deref_mut() {
                 choices[index] = choice;
             }
             (first, second, cost) = (second, third, next);
         }
         let last = (0..4).fold(0, |best, pair| if cost[pair] < cost[best] { pair } else { best });
-        (cost[last] + constant, last)
+        (cost[last] + NORMALISER * constant.logarithm(), last)
     }
 
     /// The cost of the best signs as a density of drawn lengths rather than of depths.
     fn likelihood(&self) -> f64 {
-        let frames = 0..self.track.planar.len();
-        let drawn: f64 = frames
-            .map(|index| {
-                let (planar, length) = (self.track.planar[index], (self.length)(index));
-                let error = self.track.noise[index].max(LEAST_ERROR * length).max(1e-12);
-                let depth = (length * length - planar * planar).max(2.0 * error * length).sqrt();
-                let beyond = ((planar - length).max(0.0) / error).powi(2).min(OUTLIER_CAP);
-                2.0 * (depth / length.max(1e-12)).ln() + beyond
-            })
-            .sum();
-        self.run(None).0 + drawn
+        let (mut beyond, mut slopes) = (0.0, Product::default());
+        for (index, (planar, noise)) in self.track.planar.iter().zip(self.track.noise).enumerate() {
+            let length = (self.length)(index).max(1e-12);
+            let error = noise.max(LEAST_ERROR * length);
+            beyond += ((planar - length).max(0.0) / error).powi(2).min(OUTLIER_CAP);
+            slopes.times((1.0 - (planar / length).powi(2)).max(2.0 * error / length));
+        }
+        self.run(None).0 + beyond + slopes.logarithm()
+    }
+}
+
+/// The logarithm of a long product, taken in few pieces.
+struct Product {
+    logarithm: f64,
+    factors: f64,
+}
+
+impl Default for Product {
+    fn default() -> Self {
+        Product { logarithm: 0.0, factors: 1.0 }
+    }
+}
+
+impl Product {
+    fn times(&mut self, factor: f64) {
+        self.factors *= factor;
+        if !(1e-200..1e200).contains(&self.factors) {
+            self.logarithm += self.factors.ln();
+            self.factors = 1.0;
+        }
+    }
+
+    fn logarithm(&self) -> f64 {
+        self.logarithm + self.factors.ln()
     }
 }
 

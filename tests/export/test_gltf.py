@@ -5,7 +5,7 @@ from scipy.spatial.transform import Rotation
 
 from pegbar import Motion
 from pegbar.export.gltf import glb
-from tests.export.motions import swaying
+from tests.motions import swaying
 
 SHAPES = {"SCALAR": (), "VEC3": (3,), "VEC4": (4,), "MAT4": (4, 4)}
 DTYPES = {5126: np.float32, 5125: np.uint32, 5123: np.uint16, 5121: np.uint8}

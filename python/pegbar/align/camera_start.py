@@ -26,8 +26,9 @@ _USUAL_TURN = 20.0
 class Views(NamedTuple):
     """How well G rotations explain n frames.
 
-    ``rotations`` is (G, 3, 3), ``misfit`` and ``depth`` (n, G), ``ray`` (n, 3, 3). ``misfit`` is the mean distance of marks without unit, ``depth`` the metres from camera to figure, and ``ray`` turns
-    the view axis to the figure's middle. ``middle`` (n, 3) is that middle in the world.
+    ``rotations`` is (G, 3, 3), ``misfit`` and ``depth`` (n, G), ``ray`` (n, 3, 3). ``misfit`` is the mean distance of
+    marks without unit, ``depth`` the metres from camera to figure, and ``ray`` turns the view axis to the figure's
+    middle. ``middle`` (n, 3) is that middle in the world.
     """
 
     rotations: Floats
@@ -73,10 +74,24 @@ def _rays(center: Floats) -> Floats:
     """Return the smallest rotations (n, 3, 3) that turn the view axis to image points ``center`` (n, 2)."""
     ray = np.concatenate([center, np.ones((len(center), 1))], axis=1)
     ray /= np.linalg.norm(ray, axis=1, keepdims=True)
-    axis = np.stack([-ray[:, 1], ray[:, 0], np.zeros(len(ray))], axis=1)
+    return _turns_between(np.broadcast_to([0.0, 0.0, 1.0], ray.shape), ray)
+
+
+def _turns_between(first: Floats, second: Floats) -> Floats:
+    """Return the smallest rotations (n, 3, 3) that take unit vectors ``first`` (n, 3) to ``second``."""
+    axis = np.cross(first, second)
     sine = np.linalg.norm(axis, axis=1, keepdims=True)
-    turn = axis / np.maximum(sine, 1e-12) * np.arctan2(sine, ray[:, 2:])
-    return Rotation.from_rotvec(turn).as_matrix()
+    angle = np.arctan2(sine, np.sum(first * second, axis=1, keepdims=True))
+    return Rotation.from_rotvec(axis / np.maximum(sine, 1e-12) * angle).as_matrix()
+
+
+def turning(cameras: Cameras, middles: Floats) -> Cameras:
+    """Return cameras at one place that see the figure's ``middles`` (F, 3) where ``cameras`` see them."""
+    center = np.median(cameras.centers, axis=0)
+    old, new = middles - cameras.centers, middles - center
+    old, new = (a / np.linalg.norm(a, axis=1, keepdims=True) for a in (old, new))
+    turns = _turns_between(new, old)
+    return Cameras(cameras.rotations @ turns, np.broadcast_to(center, old.shape).copy(), cameras.log_focal)
 
 
 def still_starts(shot: Shot, found: Views, log_focal: float, count: int) -> list[Cameras]:

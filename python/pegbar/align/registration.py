@@ -7,16 +7,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pegbar import arrays
-from pegbar.align import camera_start
-from pegbar.align.camera_solver import Solution, solve
-from pegbar.align.camera_terms import Cameras, Shot, Terms, reprojection
+from pegbar.align.camera_fit import Settings, fit
+from pegbar.align.camera_terms import Cameras, Shot
 from pegbar.align.camera_track import CameraTrack
 from pegbar.errors import DegenerateError
 
@@ -91,12 +89,11 @@ def register_cameras(
     shot = _shot(markers, points, visible, size)
     focal = size[0] / 2 / math.tan((field_of_view or USUAL_FIELD_OF_VIEW) / 2)
     scale = {**WEIGHTS, **(weights or {})}
-    found = _find(shot, math.log(focal), field_of_view is None, mode, window, scale, ground)
-    offsets = np.sum(reprojection(shot, found.cameras) ** 2, axis=-1)
-    errors = np.sqrt(offsets.sum(axis=1) / shot.seen.sum(axis=1))
-    noise = float(np.median(np.sqrt(offsets[shot.seen])))
+    settings = Settings(math.log(focal), field_of_view is None, window, scale, ground, True)
+    found = fit(shot, mode, settings)
+    errors = np.sqrt(np.sum(found.distances**2, axis=1) / shot.seen.sum(axis=1))
     matrices = _matrices(found.cameras, shot.middle)
-    return CameraTrack(matrices, errors, (int(size[0]), int(size[1])), mode, "travel", shot.points, noise)
+    return CameraTrack(matrices, errors, (int(size[0]), int(size[1])), mode, "travel", shot.points, found.noise)
 
 
 def _shot(markers: ArrayLike, points: ArrayLike, visible: ArrayLike | None, size: NDArray[np.int64]) -> Shot:
@@ -112,60 +109,8 @@ def _shot(markers: ArrayLike, points: ArrayLike, visible: ArrayLike | None, size
     if len(few):
         raise DegenerateError(f"markers: frame {few[0]} has {seen[few[0]].sum()} visible joints, want 4 or more")
     middle = (size - 1) / 2
-    return Shot(np.where(seen[..., None], marks, 0.0), seen, np.where(seen[..., None], world, 0.0), middle)
-
-
-def _find(
-    shot: Shot,
-    log_focal: float,
-    solve_focal: bool,
-    mode: str,
-    window: int,
-    scale: dict[str, float],
-    floor: float | None,
-) -> Solution:
-    keys = np.unique(np.linspace(0, len(shot.marks) - 1, min(_LOOKED_AT, len(shot.marks))).round().astype(int))
-    part = shot.part(keys)
-    found = camera_start.views(part, math.exp(log_focal))
-    spread = _spread(shot)
-    focal = math.exp(log_focal)
-    depth = float(np.median(found.depth[np.arange(len(keys)), found.misfit.argmin(axis=1)]))
-    smooth = math.sqrt(scale["smooth"]) * (window / 2.78) ** 2
-    terms = Terms(
-        turn=smooth * focal,
-        place=smooth * focal / depth,
-        roll=math.sqrt(scale["roll"]) * spread,
-        ground=0.0 if floor is None else math.sqrt(scale["ground"]) * focal / depth,
-        floor=floor or 0.0,
-        focal=0.05 * spread * math.sqrt(window * scale["field_of_view"]) / FOCAL_SPREAD,
-        usual_focal=log_focal,
-        knee=0.1 * spread,
-    )
-    if mode == "static":
-        trials = camera_start.still_starts(part, found, log_focal, 6)
-        ends = [solve(part, trial, terms, "static", solve_focal=False, steps=10) for trial in trials]
-        best = min(ends, key=lambda end: end.cost).cameras
-        start = camera_start.repeated(best, len(shot.marks))
-    else:
-        start = camera_start.moving_start(shot, found, keys, log_focal)
-    if mode == "pan":
-        free = solve(shot, start, terms, "free", solve_focal=False, steps=15).cameras
-        start = camera_start.still(shot, free.rotations, log_focal)
-    found_now = solve(shot, start, terms, mode, solve_focal=solve_focal, steps=20, tolerance=1e-4)
-    for _ in range(3):
-        lengths = np.linalg.norm(reprojection(shot, found_now.cameras), axis=-1)[shot.seen]
-        noise = float(np.median(lengths)) / 1.1774
-        prior = noise * math.sqrt(window * scale["field_of_view"]) / FOCAL_SPREAD
-        terms = replace(terms, knee=max(2.5 * noise, 1e-3 * spread), focal=prior)
-        found_now = solve(shot, found_now.cameras, terms, mode, solve_focal=solve_focal)
-    return found_now
-
-
-def _spread(shot: Shot) -> float:
-    """Return how far marks lie from their frame's middle, RMS in pixels."""
-    seen = shot.seen[..., None]
-    middle = (shot.marks * seen).sum(axis=1, keepdims=True) / seen.sum(axis=1, keepdims=True)
-    return float(np.sqrt(np.sum(((shot.marks - middle) * seen) ** 2) / shot.seen.sum()))
+    world = np.where(seen[..., None], world, 0.0)
+    return Shot(np.where(seen[..., None], marks, 0.0), seen, world, middle)
 
 
 def _matrices(cameras: Cameras, middle: Floats) -> Floats:

@@ -137,7 +137,7 @@ def _solve_level(figure: _Figure, level: list[Link], lengths: Floats | None, opt
     noise = SMOOTHED * np.hypot(figure.noise[:, parents], figure.noise[:, children])
     scales = np.column_stack([_jolts(clip[..., None]) + LEAST_JOLT * spans + 1e-9, doubts])
     planar = np.linalg.norm(across, axis=-1)
-    drawn = tuple(np.ascontiguousarray(values.T) for values in (planar, clip, noise)) + (scales,)
+    drawn = (*(np.ascontiguousarray(values.T) for values in (planar, clip, noise)), scales)
     found = _level_lengths(level, lengths, drawn, spans)
     depths = _flipped(_kernels.limb_depths(drawn, found), level, options.flips)
     starts, rays = (side[:, children] for side in figure.marked)
@@ -163,7 +163,7 @@ def _jolts(tracks: Floats) -> Floats:
 
 
 def _level_lengths(level: list[Link], lengths: Floats | None, drawn: tuple[Floats, ...], spans: Floats) -> Floats:
-    """The lengths (links, F): given ones, and for the rest what the drawings say; links of no length in the clip have none."""
+    """The lengths (links, F), given or as the drawings say; a link of no length in the clip has none."""
     planar, clip, noise, scales = drawn
     found = np.empty_like(planar)
     unknown = np.array([lengths is None or limb < 0 for _, _, limb in level])

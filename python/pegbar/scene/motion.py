@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pegbar.scene.body import MARKERS
+from pegbar.scene.clip_report import ClipReport
 from pegbar.scene.joints import EXTRA, map_joints
 from pegbar.scene.optical import joint_centres
 
@@ -36,12 +37,14 @@ class Motion:
         Frames a second.
     rest_frame : int or None
         Index of an inserted T-pose, which is no part of the movement.
-    joints : dict of str to str, optional
-        Canonical marker -> joint where the names' meaning is given; else it is found (`joint_map`).
+    joints : dict of str to str
+        Canonical marker -> joint where the meaning of names is given; "" for none. The rest is found (`joint_map`).
     rest : (J, 3) float, optional
         Joint positions of the rest pose in metres, Y up, for files that have one.
     ends : dict of (3,) float
         The end of a joint's bone where no other joint is, in the joint's axes, metres (BVH end sites).
+    report : ClipReport, optional
+        What was found about the file's unit, axes, floor and so on when it was read.
     """
 
     names: tuple[str, ...]
@@ -50,14 +53,31 @@ class Motion:
     rotations: Floats
     frame_rate: float
     rest_frame: int | None = None
-    joints: Mapping[str, str] | None = None
+    joints: Mapping[str, str] = field(default_factory=dict)
     rest: Floats | None = None
     ends: Mapping[str, Floats] = field(default_factory=dict)
+    report: ClipReport | None = None
 
     @cached_property
     def joint_map(self) -> Mapping[str, str]:
         """Canonical marker -> the file's joint, as given or as `map_joints` finds it."""
-        return dict(self.joints) if self.joints is not None else map_joints(self.names, self.parents, rest=self.rest)
+        rest = self.rest if self.rest is not None or not len(self.positions) else self.positions[0]
+        rest = None if rest is None or not np.isfinite(rest).all() else rest
+        found = map_joints(self.names, self.parents, rest=rest) | dict(self.joints)
+        return {marker: joint for marker, joint in found.items() if joint}
+
+    @property
+    def known_markers(self) -> tuple[str, ...]:
+        """The canonical markers and extra ones that `markers` can give."""
+        return tuple(name for name in (*MARKERS, *EXTRA) if name in self.joint_map or name in self.derived)
+
+    @cached_property
+    def derived(self) -> Mapping[str, Floats]:
+        """Canonical markers (F, 3) that are the middle of several optical markers, unless `joints` gives them."""
+        if any(parent >= 0 for parent in self.parents):
+            return {}
+        centres = joint_centres(self.names, self.positions)
+        return {marker: points for marker, points in centres.items() if marker not in self.joints}
 
     def markers(self, names: Sequence[str], *, centres: bool = True) -> Floats:
         """Return the positions (F, N, 3) of joints or canonical markers, in metres.
@@ -104,35 +124,30 @@ class Motion:
         if step < 1:
             raise ValueError(f"step: want 1 or more, got {step}")
         kept = list(range(len(self.positions))[start:stop:step])
-        return dataclasses.replace(
+        part = dataclasses.replace(
             self,
             positions=self.positions[start:stop:step],
             rotations=self.rotations[start:stop:step],
             frame_rate=self.frame_rate / step,
             rest_frame=next((place for place, frame in enumerate(kept) if frame == self.rest_frame), None),
-            joints=self.joint_map,
         )
-
-    @cached_property
-    def _optical(self) -> dict[str, Floats]:
-        """Joint centres of an optical marker set, unless the joints are given."""
-        if self.joints is not None or any(parent >= 0 for parent in self.parents):
-            return {}
-        return joint_centres(self.names, self.positions)
+        part.__dict__["joint_map"] = self.joint_map
+        return part
 
     def _marker(self, name: str, centres: bool) -> Floats:
         if name in self.names:
             return np.asarray(self.positions[:, self.names.index(name)], np.float64)
-        if centres and name in self._optical:
-            return self._optical[name]
+        if centres and name in self.derived:
+            return self.derived[name]
         joint = self.joint_map.get(name)
         if joint not in self.names:
             raise ValueError(self._unknown(name))
         place = self.names.index(joint)
         kind = name.split("_")[-1]
         if centres and (kind == "head" or (kind == "hand" and self._at_wrist(name, place))):
-            return self.positions[:, place] + np.einsum("fij,j->fi", self.rotations[:, place], self._tip(place)) / 2
-        return self.positions[:, place]
+            half: Floats = np.einsum("fij,j->fi", self.rotations[:, place], self._tip(place)) / 2
+            return half + self.positions[:, place]
+        return np.asarray(self.positions[:, place], np.float64)
 
     def _at_wrist(self, hand: str, place: int) -> bool:
         """Whether the forearm ends at the hand's joint."""
@@ -144,8 +159,8 @@ class Motion:
 
     def _offset(self, joint: int, above: int) -> Floats:
         """Where ``joint`` is in the axes of ``above`` in the first frame, (3,); differences of rounding are 0."""
-        apart: Floats = self.rotations[0, above].T @ (self.positions[0, joint] - self.positions[0, above])
-        return apart if np.abs(apart).max() > 1e-6 else np.zeros(3)
+        apart = self.rotations[0, above].T @ (self.positions[0, joint] - self.positions[0, above])
+        return np.where(np.abs(apart).max() > 1e-6, apart, 0.0)
 
     def _tip(self, joint: int) -> Floats:
         """The farthest point of what hangs on ``joint``, in its axes (3,)."""
@@ -161,7 +176,7 @@ class Motion:
         return tip
 
     def _unknown(self, name: str) -> str:
-        canonical = [marker for marker in (*MARKERS, *EXTRA) if marker in self.joint_map or marker in self._optical]
+        canonical = self.known_markers
         alike = difflib.get_close_matches(name.lower(), {known.lower() for known in (*self.names, *canonical)}, 1, 0.5)
         near = next((known for known in (*self.names, *canonical) if [known.lower()] == alike), None)
         hint = f" (did you mean {near!r}?)" if near else ""

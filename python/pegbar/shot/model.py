@@ -91,6 +91,24 @@ class PassesSection(Section):
         return UNITS[self.unit] if isinstance(self.unit, str) else self.unit
 
 
+class ClipSection(Section):
+    """``[clip]``: the motion clip that the drawing is like, as `pegbar match` finds it."""
+
+    path: str
+    start: int = Field(0, ge=0)
+    stop: int | None = Field(None, ge=1)
+    azimuth: float | None = Field(None, ge=-360, le=360)
+    elevation: float | None = Field(None, ge=-90, le=90)
+    mirrored: bool = False
+    swapped: bool = False
+
+    @model_validator(mode="after")
+    def _stops_after_its_start(self) -> ClipSection:
+        if self.stop is not None and self.stop <= self.start:
+            raise ValueError(f"stop: want a frame after start, got {self.stop} after {self.start}")
+        return self
+
+
 class OutputSection(Section):
     """``[output]``: what is written, as patterns with a frame number."""
 
@@ -124,6 +142,7 @@ class ShotFile(Section):
 
     shot: ShotSection = Field(default_factory=ShotSection)
     drawing: DrawingSection
+    clip: ClipSection | None = None
     camera: CameraSection | None = None
     passes: PassesSection | None = None
     output: OutputSection = Field(default_factory=OutputSection)
