@@ -58,6 +58,13 @@ Example: pegbar match my_shot/annotation.json mocap -o my_shot/match --write my_
 A drawn dancer with a hoop and a ribbon.
 
 Example: pegbar demo demo""",
+    "reproduce": """Repeat an experiment of the papers on clips that you have.
+
+jain2010-fig9: how wrong a walk's depth is when it comes from other clips.
+
+Tables are printed and written as CSV, plots as PNG.
+
+Example: pegbar reproduce jain2010-fig9 --data clips -o reproduced""",
 }
 #: Commands that are groups of commands: these are in the group's module.
 GROUPS = {
