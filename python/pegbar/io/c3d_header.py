@@ -79,7 +79,8 @@ def read_header(path: _Path, data: bytes) -> Header:
 def dec_floats(words: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
     """DEC's F floats, read as little-endian uint32, as float32: their halves stand swapped, their exponent 2 higher."""
     swapped = (words << np.uint32(16)) | (words >> np.uint32(16))
-    floats: np.ndarray[Any, Any] = swapped.astype("<u4").view("<f4") * np.float32(0.25)
+    with np.errstate(invalid="ignore", over="ignore"):
+        floats: np.ndarray[Any, Any] = swapped.astype("<u4").view("<f4") * np.float32(0.25)
     return np.where(swapped & np.uint32(0x7F800000), floats, np.float32(0))
 
 
