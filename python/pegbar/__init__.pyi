@@ -1,9 +1,15 @@
 from .align.camera_track import CameraTrack as CameraTrack
+from .align.descriptor import limb_trust as limb_trust
 from .align.descriptor import pose_descriptor as pose_descriptor
 from .align.descriptor import pose_distance as pose_distance
+from .align.pace import RootSpeeds as RootSpeeds
+from .align.pace import film_times as film_times
+from .align.pace import root_speeds as root_speeds
 from .align.pose import fit_pose as fit_pose
 from .align.pose_fit import PoseFit as PoseFit
 from .align.registration import register_cameras as register_cameras
+from .align.retime import retime as retime
+from .align.retime import sample_markers as sample_markers
 from .align.timewarp import TimeWarp as TimeWarp
 from .align.timewarp import time_warp as time_warp
 from .errors import DegenerateError as DegenerateError
@@ -32,6 +38,9 @@ from .layer.segmentation import segment_stick_figure as segment_stick_figure
 from .layer.volumes import TaperedCylinders as TaperedCylinders
 from .layer.volumes import collision_volumes as collision_volumes
 from .lift.backprojection import back_project as back_project
+from .lift.contact import ContactNoise as ContactNoise
+from .lift.contact import GroundedDepths as GroundedDepths
+from .lift.contact import ground_depths as ground_depths
 from .lift.hidden import fill_hidden as fill_hidden
 from .lift.limbs import align_limbs as align_limbs
 from .lift.markers import reconstruct_markers as reconstruct_markers
