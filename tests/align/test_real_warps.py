@@ -1,0 +1,71 @@
+import numpy as np
+import pytest
+
+from pegbar import film_times, read_motion, retime, root_speeds, sample_markers, time_warp
+from pegbar.scene.body import MARKERS
+from tests.align.walks import clip, distances, from_the_side
+
+PAIRS = [("07_01", "35_01"), ("35_01", "07_01"), ("07_01", "02_01"), ("02_01", "35_01")]
+
+
+@pytest.fixture(scope="module")
+def walk(test_data):
+    return clip(test_data, "07_01")
+
+
+def test_a_walk_warped_to_itself_stays(walk):
+    seen = from_the_side(walk)
+    warp = time_warp(distances(seen, seen))
+    assert warp.cost == 0
+    np.testing.assert_allclose(warp.times, np.arange(len(seen)), atol=1e-3)
+
+
+@pytest.mark.parametrize("speed", [0.4, 1.0, 2.5])
+def test_the_times_of_a_piece_at_another_speed_are_recovered(walk, speed):
+    truth = 100.3 + speed * np.arange(60)
+    seen = from_the_side(walk)
+    drawn = sample_markers(np.pad(seen, ((0, 0), (0, 0), (0, 1))), truth)[..., :2]
+    warp = time_warp(distances(drawn, seen), open_begin=True, open_end=True)
+    assert abs(warp.times - truth).max() < 1
+    assert abs(warp.frames - truth).max() < 1.5
+
+
+def test_a_piece_on_twos_is_found_and_held(walk):
+    seen = from_the_side(walk)
+    warp = time_warp(distances(seen[80:200:10], seen), open_begin=True, open_end=True, holds=[2] * 12)
+    np.testing.assert_array_equal(warp.frames, np.arange(80, 200, 10))
+    held = retime(walk, film_times(warp.times, [2] * 12), frame_rate=24)
+    assert len(held.positions) == 24
+    np.testing.assert_allclose(held.positions[::2], walk.positions[80:200:10], atol=5e-3)
+    np.testing.assert_array_equal(held.positions[::2], held.positions[1::2])
+
+
+@pytest.mark.parametrize(("drawn", "used"), PAIRS)
+def test_a_walk_warped_to_another_does_not_stutter(test_data, drawn, used):
+    walks = [clip(test_data, name, step=5) for name in (drawn, used)]
+    cost = distances(*map(from_the_side, walks))
+    warp = time_warp(cost, open_begin=True, open_end=True, slope_limit=2)
+    root = walks[1].markers(["pelvis"])[:, 0]
+    speeds = root_speeds(root, warp, clip_rate=24, drawn_rate=24)
+    assert speeds.warped.min() == 0
+    assert speeds.warped.max() > 1.15 * speeds.clip.max()
+    assert speeds.smoothed.min() > 0.35 * speeds.clip.min()
+    assert speeds.smoothed.max() < 1.15 * speeds.clip.max()
+    accelerations = [24 * np.diff(each).std() for each in speeds]
+    assert accelerations[2] < 1.5 * accelerations[0] < accelerations[1] / 2
+
+
+def test_bones_of_a_retimed_clip_keep_their_lengths(test_data, walk):
+    whole = read_motion(test_data / "mocap" / "bvh" / "cmu_07_01.bvh")
+    assert whole.rest_frame == 0
+    got = retime(whole, np.linspace(0, 300, 77), frame_rate=24)
+    parents = np.array(whole.parents)
+    bones = [np.linalg.norm(np.diff(m.positions[:, [j, parents[j]]], axis=1)[:, 0], axis=1) for m in (got, whole) for j in
+             np.flatnonzero(parents >= 0)]
+    count = len(bones) // 2
+    np.testing.assert_allclose([b.max() for b in bones[:count]], [b.mean() for b in bones[count:]], atol=1e-6)
+    np.testing.assert_allclose([b.min() for b in bones[:count]], [b.mean() for b in bones[count:]], atol=1e-6)
+    straight = sample_markers(whole.markers(MARKERS), np.linspace(1, 300, 60))
+    np.testing.assert_allclose(
+        retime(whole, np.linspace(1, 300, 60), frame_rate=24).markers(MARKERS), straight, atol=2e-3
+    )
