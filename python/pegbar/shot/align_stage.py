@@ -28,6 +28,7 @@ from pegbar.scene.alignment import Alignment
 from pegbar.scene.drawing import Drawing
 from pegbar.shot.alignment import AlignOptions, Retiming, align_drawing
 from pegbar.shot.clip_choice import Choice, choose_clip
+from pegbar.shot.marks import ALIGNED
 from pegbar.shot.plan import Shot
 from pegbar.shot.record import fingerprint, is_up_to_date, write_record
 
@@ -37,7 +38,10 @@ _SHEET = 24
 
 @dataclass(frozen=True, eq=False)
 class AlignStage:
-    """Aligns all drawings of ``shot``; nothing is done again that is up to date, unless ``overwrite``."""
+    """Aligns all drawings of ``shot``, unless that is up to date and not to be overwritten.
+
+    ``shot`` is to be opened without what was aligned before.
+    """
 
     shot: Shot
     overwrite: bool = False
@@ -55,7 +59,7 @@ class AlignStage:
     def outputs(self) -> list[Path]:
         """The files that the stage writes, the main one first."""
         overlays = [self.folder / f"overlay.{number:04d}.png" for number in self.numbers]
-        names = ("alignment.npz", "aligned.json", "errors.csv", "warp.png", "sheet.png")
+        names = ("alignment.npz", ALIGNED, "errors.csv", "warp.png", "sheet.png")
         return [*(self.folder / name for name in names), *overlays]
 
     def run(self, progress: Callable[[int, int], None] | None = None) -> tuple[Alignment, bool]:
