@@ -22,6 +22,7 @@ from pegbar.report.match_sheet import SheetRow, match_sheet
 from pegbar.report.match_table import describe_match, report_left_out, report_matches
 from pegbar.scene.body import MARKERS
 from pegbar.scene.drawing import Drawing
+from pegbar.shot.clip import clip_text, write_clip
 
 # Drawings and matches on the contact sheet.
 _KEYS, _ROWS = 6, 8
@@ -139,20 +140,16 @@ def _write_choice(shot: Path | None, clips: Path, found: Matches) -> None:
         if shot is not None:
             print(f"match: {shot} is left as it is")
         return
-    # The models of the shot file take long to import.
-    from pegbar.shot.clip import clip_text, write_clip
-    from pegbar.shot.model import ClipSection
-
     best, folder = found.matches[0], shot.parent if shot is not None else Path()
-    section = ClipSection(
-        path=Path(os.path.relpath(clips / best.clip, folder)).as_posix(),
-        start=best.start,
-        stop=best.stop,
-        azimuth=round(best.azimuth, 1),
-        elevation=round(best.elevation, 1),
-        mirrored=best.mirrored,
-        swapped=best.swapped,
-    )
+    section = {
+        "path": Path(os.path.relpath(clips / best.clip, folder)).as_posix(),
+        "start": best.start,
+        "stop": best.stop,
+        "azimuth": round(best.azimuth, 1),
+        "elevation": round(best.elevation, 1),
+        "mirrored": best.mirrored,
+        "swapped": best.swapped,
+    }
     if shot is None:
         print(f"\nFor the shot file:\n\n{clip_text(section)}", end="")
         return

@@ -18,7 +18,7 @@ def describe_match(rank: int, match: Match, clip: Clip) -> tuple[str, ...]:
     return (
         f"{rank}  {match.clip.rsplit('/', 1)[-1]}",
         f"frames {_span(match)}, {_seconds(match, clip)} s",
-        f"azimuth {match.azimuth:.0f}, elevation {match.elevation:.0f}",
+        f"from {match.seen_from} ({match.azimuth:.0f}, {match.elevation:.0f})",
         match.sides,
         f"{match.cost:.1f} degrees: {_VERDICTS[match.verdict]}",
     )
@@ -31,11 +31,11 @@ def report_matches(folder: ClipFolder, found: Matches) -> None:
 
     clips = {clip.name: clip for clip in folder.clips}
     table = Table(box=None, pad_edge=False, header_style="bold")
-    for name in ("", "clip", "frames", "seconds", "azimuth", "elevation", "left and right", "degrees", "verdict"):
+    for name in ("", "clip", "frames", "seconds", "azimuth", "elevation", "seen from", "left and right", "degrees", "verdict"):
         numeric = name in ("", "frames", "seconds", "azimuth", "elevation", "degrees")
         table.add_column(name, justify="right" if numeric else "left", no_wrap=True)
     for rank, match in enumerate(found.matches, 1):
-        view = (f"{match.azimuth:.0f}", f"{match.elevation:.0f}", match.sides)
+        view = (f"{match.azimuth:.0f}", f"{match.elevation:.0f}", match.seen_from, match.sides)
         verdict = f"[{_COLORS[match.verdict]}]{_VERDICTS[match.verdict]}[/]"
         seconds = _seconds(match, clips[match.clip])
         table.add_row(str(rank), match.clip, _span(match), seconds, *view, f"{match.cost:.1f}", verdict)

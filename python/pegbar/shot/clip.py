@@ -4,23 +4,22 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from pegbar.errors import FormatError
 from pegbar.io.atomic import complete_file
-from pegbar.shot.load import load_shot, validate_shot
-from pegbar.shot.model import ClipSection
 
 _HEADER = re.compile(r"\s*\[{1,2}\s*([^\]]+?)\s*\]{1,2}\s*(#.*)?$")
 
 
-def clip_text(section: ClipSection) -> str:
+def clip_text(section: Mapping[str, Any]) -> str:
     """Return the ``[clip]`` section as text."""
     return "\n".join(["[clip]", *(f"{key} = {value}" for key, value in _values(section).items()), ""])
 
 
-def write_clip(path: Path, section: ClipSection) -> None:
+def write_clip(path: Path, section: Mapping[str, Any]) -> None:
     """Put ``section`` into the shot file at ``path``, in place of the one that is there.
 
     Raises
@@ -28,6 +27,9 @@ def write_clip(path: Path, section: ClipSection) -> None:
     FileNotFoundError, FormatError, ShotError
         Where there is no shot file, or one with problems: it is left as it is.
     """
+    # The models of the shot file take long to import; printing a section does not need them.
+    from pegbar.shot.load import load_shot, validate_shot
+
     load_shot(path)
     text = path.read_bytes().decode("utf-8-sig")
     changed = replace_clip(text, section)
@@ -40,7 +42,7 @@ def write_clip(path: Path, section: ClipSection) -> None:
         part.write_text(changed, encoding="utf-8", newline="")
 
 
-def replace_clip(text: str, section: ClipSection) -> str:
+def replace_clip(text: str, section: Mapping[str, Any]) -> str:
     """Return the TOML ``text`` with ``section`` in it: in place of its own, keeping its comments, or at the end."""
     lines = text.splitlines()
     headers = [(number, found[1]) for number, line in enumerate(lines) if (found := _HEADER.match(line))]
@@ -67,8 +69,8 @@ def _renewed(line: str, values: dict[str, str]) -> str | None:
     return f"{found[1]}{found[2]}{found[3]}{values.pop(found[2])}{found[5]}"
 
 
-def _values(section: ClipSection) -> dict[str, str]:
-    return {key: _toml(value) for key, value in section.model_dump(exclude_none=True).items()}
+def _values(section: Mapping[str, Any]) -> dict[str, str]:
+    return {key: _toml(value) for key, value in section.items()}
 
 
 def _toml(value: Any) -> str:
