@@ -80,13 +80,15 @@ def _record(path: _Path, text: bytes, skeleton: Skeleton, notes: tuple[str, ...]
     keywords, first, step, values = _kernels.parse_amc(os.fspath(path), text, numbers)
     names, parents, offsets, axes = _joints(skeleton, bones)
     if len(values) * len(names) > len(text) + _JOINTS_OF_SMALL_FILE:
-        raise FormatError(path, f"{len(values)} frames of {len(names)} joints, most of which never move")
+        raise FormatError(path, f"{len(values)} frames of {len(names)} joints, most of which never move", line=1)
     degrees = skeleton.degrees if not {":degrees", ":radians"} & set(keywords) else ":degrees" in keywords
     angle = math.pi / 180 if degrees else 1.0
     counts, codes, table = _channels(skeleton, bones, names, values, angle)
     positions, rotations = _kernels.forward_kinematics((parents, offsets, axes, counts, codes), table, angle)
     if (first, step) != (1, 1):
         notes += (f"its frames are numbered from {first} in steps of {step}",)
+    if not text.endswith((b"\n", b"\r")):
+        notes += ("its last line has no end: if it was cut short there, frames are missing",)
     return Recording(
         path=path,
         names=tuple(names),

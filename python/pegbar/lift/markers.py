@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from pegbar import _kernels, arrays
 from pegbar.errors import DegenerateError
-from pegbar.lift.lengths import given_lengths, limb_lengths
+from pegbar.lift.lengths import clip_lengths, given_lengths
 from pegbar.lift.projection import frame_cameras, projection_rows
+from pegbar.lift.refine import Refinement, refine_markers
 from pegbar.lift.subspace import principal_components
 
 Floats = NDArray[np.float64]
@@ -83,11 +84,13 @@ def reconstruct_markers(
     cameras = frame_cameras(camera, frames)
     check_weights(limb_weight=limb_weight, prior_weight=prior_weight)
     check_marks(aligned)
-    if lengths is None:
-        lengths = limb_lengths(aligned, prior, cameras, limbs)
-    lengths = given_lengths(lengths, frames, len(limbs))
+    given = None if lengths is None else given_lengths(lengths, frames, len(limbs))
     if not frames:
         return prior
+    if refine:
+        return refine_markers(aligned, prior, cameras, limbs, given, Refinement())[0]
+    if given is None:
+        given = given_lengths(clip_lengths(prior, limbs), frames, len(limbs))
     mean, basis = np.empty((0, 3)), np.empty((0, 3 * markers))
     if training is not None:
         poses = arrays.floats("training", training, ("G", markers, 3))
@@ -97,7 +100,7 @@ def reconstruct_markers(
     rows = projection_rows(aligned, cameras)
     # Where drawing and limbs leave a direction open the clip's stays: the limit of a weight that goes to 0.
     weights = (float(limb_weight), max(float(prior_weight), 1e-9))
-    return _kernels.lift_markers(rows, limbs, lengths, prior, weights, (mean, basis))
+    return _kernels.lift_markers(rows, limbs, given, prior, weights, (mean, basis))
 
 
 def check_weights(**weights: float) -> None:
