@@ -69,6 +69,8 @@ Example: pegbar demo demo""",
 
 jain2010-fig9: how wrong a walk's depth is when it comes from other clips.
 
+foot-contact: how much better feet and knees are placed when standing feet take their depth from the floor.
+
 Tables are printed and written as CSV, plots as PNG.
 
 Example: pegbar reproduce jain2010-fig9 --data clips -o reproduced""",
