@@ -43,6 +43,7 @@ from .lift.contact import GroundedDepths as GroundedDepths
 from .lift.contact import ground_depths as ground_depths
 from .lift.hidden import fill_hidden as fill_hidden
 from .lift.limbs import align_limbs as align_limbs
+from .lift.markers import drawn_lengths as drawn_lengths
 from .lift.markers import reconstruct_markers as reconstruct_markers
 from .scene.camera import PerspectiveCamera as PerspectiveCamera
 from .scene.clip_report import ClipReport as ClipReport

@@ -93,7 +93,9 @@ def _groups(clips: Sequence[Clip]) -> Iterator[list[int]]:
             yield group
 
 
-def views(azimuths: Sequence[float], elevations: Sequence[float]) -> tuple[NDArray[np.float32], list[tuple[float, float]]]:
+def views(
+    azimuths: Sequence[float], elevations: Sequence[float]
+) -> tuple[NDArray[np.float32], list[tuple[float, float]]]:
     """The picture's axes (V, 2, 3) of every view, and its azimuth and elevation in degrees."""
     places = [(float(azimuth), float(elevation)) for elevation in elevations for azimuth in azimuths]
     axes = [OrthographicCamera.from_angles(*place).rotation[:2] for place in places]

@@ -231,13 +231,9 @@ def _limits(movement: float, drawings: int) -> tuple[float, float]:
     return FITS[0] + FITS[1] * movement, DOUBTFUL[0] + DOUBTFUL[1] * movement
 
 
-def _match(
-    clip: Clip, found: Aligned, marks: Marks, seen: NDArray[np.bool_], limits: tuple[float, float]
-) -> Match:
+def _match(clip: Clip, found: Aligned, marks: Marks, seen: NDArray[np.bool_], limits: tuple[float, float]) -> Match:
     times = clip.file_frames(found.times[marks.source])
-    sides: Sides = tell_sides(
-        clip.at(times), found.azimuth, found.elevation, bool(found.candidate.exchanged), seen
-    )
+    sides: Sides = tell_sides(clip.at(times), found.azimuth, found.elevation, bool(found.candidate.exchanged), seen)
     cost = float(np.degrees(found.cost))
     return Match(
         clip=clip.name,

@@ -95,9 +95,7 @@ class Refiner:
         """The cheapest path and its mean angle."""
         marks = self.marks
         projected = pose_descriptor(camera.project(window.markers), marks.pairs)
-        table = pose_distance(
-            marks.angles[exchanged], projected, weights=marks.weights, a_trust=marks.trust[exchanged]
-        )
+        table = pose_distance(marks.angles[exchanged], projected, weights=marks.weights, a_trust=marks.trust[exchanged])
         path, cost = _kernels.segment_path(table[order], steps)
         return path, cost / (marks.weights.sum() * len(order))
 
