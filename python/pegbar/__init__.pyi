@@ -5,6 +5,7 @@ from .align.descriptor import pose_distance as pose_distance
 from .align.pace import RootSpeeds as RootSpeeds
 from .align.pace import film_times as film_times
 from .align.pace import root_speeds as root_speeds
+from .align.parallel_view import find_orthographic as find_orthographic
 from .align.pose import fit_pose as fit_pose
 from .align.pose_fit import PoseFit as PoseFit
 from .align.registration import register_cameras as register_cameras
