@@ -2,12 +2,13 @@ from .align.camera_track import CameraTrack as CameraTrack
 from .align.descriptor import limb_trust as limb_trust
 from .align.descriptor import pose_descriptor as pose_descriptor
 from .align.descriptor import pose_distance as pose_distance
-from .align.pace import RootSpeeds as RootSpeeds
-from .align.pace import film_times as film_times
-from .align.pace import root_speeds as root_speeds
 from .align.match import Match as Match
 from .align.match import Matches as Matches
 from .align.match import match_clips as match_clips
+from .align.pace import RootSpeeds as RootSpeeds
+from .align.pace import film_times as film_times
+from .align.pace import root_speeds as root_speeds
+from .align.parallel_view import find_orthographic as find_orthographic
 from .align.pose import fit_pose as fit_pose
 from .align.pose_fit import PoseFit as PoseFit
 from .align.registration import register_cameras as register_cameras
@@ -47,6 +48,7 @@ from .lift.contact import GroundedDepths as GroundedDepths
 from .lift.contact import ground_depths as ground_depths
 from .lift.hidden import fill_hidden as fill_hidden
 from .lift.limbs import align_limbs as align_limbs
+from .lift.markers import drawn_lengths as drawn_lengths
 from .lift.markers import reconstruct_markers as reconstruct_markers
 from .scene.camera import PerspectiveCamera as PerspectiveCamera
 from .scene.clip import Clip as Clip

@@ -67,6 +67,8 @@ A drawn dancer with a hoop and a ribbon.
 Example: pegbar demo demo""",
     "reproduce": """Repeat an experiment of the papers on clips that you have.
 
+jain2009-table1: a walk drawn by a known camera and lifted to 3D with another walk.
+
 jain2010-fig9: how wrong a walk's depth is when it comes from other clips.
 
 foot-contact: how much better feet and knees are placed when standing feet take their depth from the floor.
