@@ -116,7 +116,7 @@ def parse_bvh(
     tuple[list[str], list[int], _Doubles, list[int], _Doubles], tuple[list[int], NDArray[np.uint8], float, _Doubles]
 ]: ...
 def forward_kinematics(
-    joints: tuple[list[int], _Doubles, _Doubles, list[int], NDArray[np.uint8]], values: _Doubles, angle: float
+    joints: tuple[list[int], _Doubles, _Doubles, list[int], NDArray[np.uint8]], values: _Doubles, degrees: bool
 ) -> tuple[_Doubles, _Doubles]: ...
 def fit_poses(
     joints: _Doubles,
