@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from pegbar import _kernels
 from pegbar.align.marks import Marks
 from pegbar.scene.clip import Clip
-from pegbar.scene.orthographic import OrthographicCamera
 
 #: Where the camera may stand: degrees, all round and a little below to well above.
 AZIMUTHS = tuple(range(0, 360, 15))
@@ -96,10 +95,12 @@ def _groups(clips: Sequence[Clip]) -> Iterator[list[int]]:
 def views(
     azimuths: Sequence[float], elevations: Sequence[float]
 ) -> tuple[NDArray[np.float32], list[tuple[float, float]]]:
-    """The picture's axes (V, 2, 3) of every view, and its azimuth and elevation in degrees."""
+    """The picture's axes (V, 2, 3) of every view, right and down, and its azimuth and elevation in degrees."""
     places = [(float(azimuth), float(elevation)) for elevation in elevations for azimuth in azimuths]
-    axes = [OrthographicCamera.from_angles(*place).rotation[:2] for place in places]
-    return np.array(axes, np.float32), places
+    (sa, ca), (se, ce) = ((np.sin(angle), np.cos(angle)) for angle in np.radians(places).T)
+    right = np.stack([ca, 0 * ca, -sa], axis=1)
+    down = np.stack([sa * se, -ce, ca * se], axis=1)
+    return np.stack([right, down], axis=1).astype(np.float32), places
 
 
 def line_vectors(markers: NDArray[np.float32], pairs: NDArray[np.intp]) -> NDArray[np.float32]:

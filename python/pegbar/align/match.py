@@ -6,7 +6,9 @@ left and right exchanged. The cost is equation 4 as a mean: the angle between a 
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,7 +18,7 @@ from pegbar import arrays
 from pegbar.align.candidates import find_candidates
 from pegbar.align.marks import EXCHANGED, Marks, read_marks
 from pegbar.align.refine import Aligned, Refiner
-from pegbar.align.sides import Sides, mirror, tell_sides
+from pegbar.align.sides import mirror, seen_from, tell_sides
 from pegbar.scene.body import MARKERS
 from pegbar.scene.clip import Clip
 from pegbar.scene.orthographic import OrthographicCamera
@@ -44,6 +46,8 @@ class Match:
         The file's frame at each drawn frame, in fractions. Never decreasing, but where a cycle begins anew.
     azimuth, elevation : float
         Where the camera stands, in degrees, as `OrthographicCamera.from_angles` takes them.
+    seen_from : str
+        The side of the person that the camera sees: "front", "front left", "left" and so on.
     mirrored : bool
         The clip's mirror image is meant: reflected in x = 0, left and right joints exchanged.
     swapped : bool
@@ -69,6 +73,7 @@ class Match:
     times: Floats
     azimuth: float
     elevation: float
+    seen_from: str
     mirrored: bool
     swapped: bool
     sides: str
@@ -178,7 +183,8 @@ def match_clips(
     searched = [clip for clip in clips if clip.name not in skipped]
     refiner = Refiner(marks, speed)
     candidates = find_candidates(searched, marks, speed, max(3 * top, 24))
-    refined = [(searched[c.clip], refiner.refine(searched[c.clip], c)) for c in candidates]
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        refined = list(pool.map(lambda c: (searched[c.clip], refiner.refine(searched[c.clip], c)), candidates))
     aligned = sorted(((clip, found) for clip, found in refined if found), key=lambda pair: pair[1].cost)
     movement = float(np.degrees(marks.movement()))
     limits = _limits(movement, len(marks.times[0]))
@@ -231,9 +237,12 @@ def _limits(movement: float, drawings: int) -> tuple[float, float]:
     return FITS[0] + FITS[1] * movement, DOUBTFUL[0] + DOUBTFUL[1] * movement
 
 
-def _match(clip: Clip, found: Aligned, marks: Marks, seen: NDArray[np.bool_], limits: tuple[float, float]) -> Match:
+def _match(
+    clip: Clip, found: Aligned, marks: Marks, seen: NDArray[np.bool_], limits: tuple[float, float]
+) -> Match:
     times = clip.file_frames(found.times[marks.source])
-    sides: Sides = tell_sides(clip.at(times), found.azimuth, found.elevation, bool(found.candidate.exchanged), seen)
+    markers = clip.at(times)
+    sides = tell_sides(markers, found.azimuth, found.elevation, bool(found.candidate.exchanged), seen)
     cost = float(np.degrees(found.cost))
     return Match(
         clip=clip.name,
@@ -242,6 +251,7 @@ def _match(clip: Clip, found: Aligned, marks: Marks, seen: NDArray[np.bool_], li
         times=times,
         azimuth=round(sides.azimuth, 2),
         elevation=round(sides.elevation, 2),
+        seen_from=seen_from(mirror(markers) if sides.mirrored else markers, sides.azimuth),
         mirrored=sides.mirrored,
         swapped=sides.swapped,
         sides=sides.words,
