@@ -18,7 +18,9 @@ mod palette;
 mod pose;
 mod raster;
 mod rim;
+mod search;
 mod segment;
+mod signs;
 mod warp;
 
 use pyo3::prelude::*;
@@ -59,7 +61,11 @@ mod _kernels {
     #[pymodule_export]
     use crate::rim::rim_depth;
     #[pymodule_export]
+    use crate::search::{search_clips, segment_path};
+    #[pymodule_export]
     use crate::segment::segment_stick_figure;
+    #[pymodule_export]
+    use crate::signs::{length_costs, limb_depths};
     #[pymodule_export]
     use crate::warp::time_warp;
 }
