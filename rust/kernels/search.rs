@@ -61,8 +61,8 @@ pub fn count_blocks(ranges: &[[u64; 2]], block: usize) -> usize {
 impl Drawn<'_> {
     fn check(&self, limbs: usize) -> Result<(), KernelError> {
         let row = self.frames * limbs;
-        if row == 0 {
-            return Err(KernelError::Argument { argument: "angles", problem: "want a frame and a limb" });
+        if row == 0 || self.angles.is_empty() || self.orders.is_empty() {
+            return Err(KernelError::Argument { argument: "angles", problem: "want a frame, a limb and an order" });
         }
         check_length("angles", self.angles.len() / row * row, self.angles.len())?;
         check_length("weights", self.angles.len(), self.weights.len())?;

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, cho_solve_banded, cholesky_banded
 
-from pegbar.align.camera_terms import FOCAL, Cameras, Normal, Shot, Terms, cost, normal
+from pegbar.align.camera_terms import COLUMNS, FOCAL, Cameras, Normal, Shot, Terms, Unknowns, cost, normal
 
 Floats = NDArray[np.float64]
-#: Columns of `camera_terms` that every frame has for itself, by mode; the other ones are shared.
+#: Columns of `camera_terms` that every frame has for itself, by mode.
 OWN_COLUMNS = {"static": (), "pan": (0, 1, 2), "free": (0, 1, 2, 3, 4, 5)}
+_MOST_DAMPING = 1e8
 
 
-@dataclass(frozen=True)
-class Solution:
+class Solution(NamedTuple):
     """Cameras, their cost in pixels squared, and how many steps were tried."""
 
     cameras: Cameras
@@ -24,72 +24,73 @@ class Solution:
     steps: int
 
 
-def solve(
-    shot: Shot, start: Cameras, terms: Terms, mode: str, *, solve_focal: bool, steps: int = 50, tolerance: float = 1e-6
-) -> Solution:
-    """Return the cameras of least cost near ``start``; frames share what ``mode`` does not let move."""
+def unknowns_of(mode: str, solve_focal: bool) -> Unknowns:
+    """Return which columns move in ``mode``."""
     own = OWN_COLUMNS[mode]
-    terms = replace(terms, turn=terms.turn if 0 in own else 0.0, place=terms.place if 3 in own else 0.0)
-    shared = tuple(column for column in range(6) if column not in own) + ((FOCAL,) if solve_focal else ())
+    shared = tuple(column for column in range(FOCAL) if column not in own)
+    return Unknowns(own, (*shared, FOCAL) if solve_focal else shared)
+
+
+def solve(
+    shot: Shot, start: Cameras, terms: Terms, unknowns: Unknowns, *, steps: int = 50, tolerance: float = 1e-6
+) -> Solution:
+    """Return the cameras of least cost near ``start``; it ends when a step gains less than ``tolerance`` of it.
+
+    A start that has marks behind the camera is returned as it is, at infinite cost.
+    """
     cameras, best = start, cost(shot, start, terms)
-    damping, tried, equations = 1e-3, 0, None
-    while tried < steps:
+    if best == np.inf:
+        return Solution(start, best, 0)
+    damping, tried = 1e-3, 0
+    equations: Normal | None = None
+    while tried < steps and damping < _MOST_DAMPING:
         tried += 1
-        equations = normal(shot, cameras, terms) if equations is None else equations
-        step = _step(equations, own, shared, damping)
-        trial = cameras.moved(step[:, :6], step[0, FOCAL]) if step is not None else None
-        value = cost(shot, trial, terms) if trial is not None else np.inf
-        if value <= best and trial is not None:
-            done = best - value <= tolerance * best
-            cameras, best, equations, damping = trial, value, None, max(damping / 5, 1e-9)
-            if done:
-                break
-        else:
+        equations = normal(shot, cameras, terms, unknowns) if equations is None else equations
+        step = damped_step(equations, unknowns, damping)
+        trial = cameras if step is None else cameras.moved(step)
+        value = np.inf if step is None else cost(shot, trial, terms)
+        if value > best:
             damping *= 4
-            if damping > 1e8:
-                break
+            continue
+        gain, cameras, best, equations, damping = best - value, trial, value, None, max(damping / 5, 1e-9)
+        if gain <= tolerance * best:
+            break
     return Solution(cameras, best, tried)
 
 
-def _step(equations: Normal, own: tuple[int, ...], shared: tuple[int, ...], damping: float) -> Floats | None:
-    """Return the damped step (F, 7), or None where the equations cannot be factored."""
+def damped_step(equations: Normal, unknowns: Unknowns, damping: float) -> Floats | None:
+    """Return the step (F, 7) of equations whose diagonal is raised by ``damping``; None where they have no solution."""
+    own, shared = unknowns
     frames = len(equations.own)
-    corner = equations.own[:, shared][:, :, shared].sum(axis=0)
-    right = -equations.gradient[:, shared].sum(axis=0)
+    corner, right = equations.corner.copy(), -equations.shared_slope
     corner[np.diag_indices_from(corner)] *= 1 + damping
-    step = np.zeros((frames, 7))
+    step = np.zeros((frames, COLUMNS))
     try:
         if own:
-            band = _band(equations, own, damping)
-            arrow = equations.own[:, own][:, :, shared].reshape(frames * len(own), len(shared))
-            inside = -equations.gradient[:, own].reshape(-1, 1)
-            factor = cholesky_banded(band, lower=True, check_finite=False)
-            solved = cho_solve_banded((factor, True), np.hstack([arrow, inside]), check_finite=False)
+            arrow = equations.arrow.reshape(frames * len(own), len(shared))
+            band = cholesky_banded(_band(equations, damping), lower=True, check_finite=False)
+            columns = np.column_stack([arrow, -equations.slope.ravel()])
+            solved = cho_solve_banded((band, True), columns, check_finite=False)
             across, alone = solved[:, :-1], solved[:, -1]
-            if shared:
-                corner, right = corner - arrow.T @ across, right - arrow.T @ alone
-        common = cho_solve(cho_factor(corner, check_finite=False), right, check_finite=False) if shared else right
+            corner, right = corner - arrow.T @ across, right - arrow.T @ alone
+        if shared:
+            step[:, shared] = right = cho_solve(cho_factor(corner), right)
         if own:
-            step[:, own] = (alone - across @ common).reshape(frames, len(own))
+            step[:, own] = (alone - across @ right).reshape(frames, len(own))
     except (LinAlgError, ValueError):
         return None
-    step[:, shared] = common
     return step if np.isfinite(step).all() else None
 
 
-def _band(equations: Normal, own: tuple[int, ...], damping: float) -> Floats:
+def _band(equations: Normal, damping: float) -> Floats:
     """Return the frames' own equations in scipy's lower banded form."""
-    size, frames = len(own), len(equations.own)
+    frames, size = equations.slope.shape
     band = np.zeros((3 * size, frames, size))
-    blocks = (equations.own, equations.next, equations.after)
-    for distance, block in enumerate(blocks):
-        if len(block) == 0:
-            continue
-        for row, first in enumerate(own):
-            for column, second in enumerate(own):
-                offset = distance * size + row - column
-                if offset >= 0:
-                    # `block` couples a frame (rows) with a later one (columns): below the diagonal it is transposed.
-                    band[offset, : len(block), column] = block[:, second, first]
+    for distance, block in enumerate((equations.own, equations.next, equations.after)):
+        for later, earlier in np.ndindex(size, size):
+            below = distance * size + later - earlier
+            if below >= 0:
+                # Blocks have the earlier frame's unknown first; below the diagonal the later one names the row.
+                band[below, : len(block), earlier] = block[:, earlier, later]
     band[0] *= 1 + damping
     return band.reshape(3 * size, frames * size)

@@ -22,12 +22,16 @@ ELEVATIONS = np.arange(-45.0, 76.0, 15.0)
 #: A turn of so many degrees from one looked-at frame to the next costs as much as the usual frame fits badly.
 _USUAL_TURN = 20.0
 
+#: A camera starts so many metres away at least.
+_NEAREST = 0.5
+
 
 class Views(NamedTuple):
     """How well G rotations explain n frames.
 
-    ``rotations`` is (G, 3, 3), ``misfit`` and ``depth`` (n, G), ``ray`` (n, 3, 3). ``misfit`` is the mean distance of marks without unit, ``depth`` the metres from camera to figure, and ``ray`` turns
-    the view axis to the figure's middle. ``middle`` (n, 3) is that middle in the world.
+    ``rotations`` is (G, 3, 3), ``misfit`` and ``depth`` (n, G), ``ray`` (n, 3, 3). ``misfit`` is the mean distance of
+    marks without unit, ``depth`` the metres from camera to figure, and ``ray`` turns the view axis to the figure's
+    middle. ``middle`` (n, 3) is that middle in the world.
     """
 
     rotations: Floats
@@ -73,10 +77,24 @@ def _rays(center: Floats) -> Floats:
     """Return the smallest rotations (n, 3, 3) that turn the view axis to image points ``center`` (n, 2)."""
     ray = np.concatenate([center, np.ones((len(center), 1))], axis=1)
     ray /= np.linalg.norm(ray, axis=1, keepdims=True)
-    axis = np.stack([-ray[:, 1], ray[:, 0], np.zeros(len(ray))], axis=1)
+    return _turns_between(np.broadcast_to([0.0, 0.0, 1.0], ray.shape), ray)
+
+
+def _turns_between(first: Floats, second: Floats) -> Floats:
+    """Return the smallest rotations (n, 3, 3) that take unit vectors ``first`` (n, 3) to ``second``."""
+    axis = np.cross(first, second)
     sine = np.linalg.norm(axis, axis=1, keepdims=True)
-    turn = axis / np.maximum(sine, 1e-12) * np.arctan2(sine, ray[:, 2:])
-    return Rotation.from_rotvec(turn).as_matrix()
+    angle = np.arctan2(sine, np.sum(first * second, axis=1, keepdims=True))
+    return Rotation.from_rotvec(axis / np.maximum(sine, 1e-12) * angle).as_matrix()
+
+
+def turning(cameras: Cameras, middles: Floats) -> Cameras:
+    """Return cameras at one place that see the figure's ``middles`` (F, 3) where ``cameras`` see them."""
+    center = np.median(cameras.centers, axis=0)
+    old, new = middles - cameras.centers, middles - center
+    old, new = (a / np.linalg.norm(a, axis=1, keepdims=True) for a in (old, new))
+    turns = _turns_between(new, old)
+    return Cameras(cameras.rotations @ turns, np.broadcast_to(center, old.shape).copy(), cameras.log_focal)
 
 
 def still_starts(shot: Shot, found: Views, log_focal: float, count: int) -> list[Cameras]:
@@ -91,11 +109,17 @@ def still_starts(shot: Shot, found: Views, log_focal: float, count: int) -> list
 
 
 def still(shot: Shot, rotations: Floats, log_focal: float) -> Cameras:
-    """Return cameras with these ``rotations`` (F, 3, 3) and the one centre from which the marks' rays fit best."""
+    """Return cameras with these ``rotations`` (F, 3, 3) and the one centre from which the marks' rays fit best.
+
+    Where that is too near, the centre goes back until the whole figure is in front in every frame.
+    """
     image = (shot.marks - shot.middle) / np.exp(log_focal)
     rows = (image[..., None] * rotations[:, None, 2:, :] - rotations[:, None, :2, :]) * shot.seen[..., None, None]
     offset = np.einsum("fnac,fnc->fna", rows, shot.points)
     center = np.linalg.lstsq(rows.reshape(-1, 3), offset.ravel(), rcond=None)[0]
+    depth = np.einsum("fc,fnc->fn", rotations[:, 2], shot.points - center)[shot.seen]
+    ahead = rotations[:, 2].mean(axis=0)
+    center = center - ahead / np.linalg.norm(ahead) * max(0.0, _NEAREST - float(depth.min()))
     return Cameras(np.array(rotations), np.broadcast_to(center, (len(rotations), 3)).copy(), log_focal)
 
 

@@ -1,7 +1,8 @@
 """The terms of Jain et al. 2010, equation 1, for a whole shot, as residuals in pixels with analytic derivatives.
 
 Unknowns of a frame are a rotation (world to camera; a small turn w acts as exp([w]) R), the camera's centre, and the
-logarithm of the focal length, which the shot shares: seven columns in this order. Every residual is in pixels.
+logarithm of the focal length: seven columns in this order. A frame has some columns for itself and the shot shares
+the others.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ from scipy.spatial.transform import Rotation
 Floats = NDArray[np.float64]
 COLUMNS = 7
 TURN, PLACE, FOCAL = slice(0, 3), slice(3, 6), 6
+_HEIGHT = 4
+_SECOND_DIFFERENCE = (1.0, -2.0, 1.0)
 
 
 class Cameras(NamedTuple):
@@ -25,10 +28,11 @@ class Cameras(NamedTuple):
     centers: Floats
     log_focal: float
 
-    def moved(self, steps: Floats, focal_step: float) -> Cameras:
-        """Return the cameras after ``steps`` (F, 6), turns in radians and metres."""
+    def moved(self, steps: Floats) -> Cameras:
+        """Return the cameras after ``steps`` (F, 7); the focal length takes the first frame's."""
         turns = Rotation.from_rotvec(steps[:, TURN]).as_matrix()
-        return Cameras(turns @ self.rotations, self.centers + steps[:, PLACE], self.log_focal + focal_step)
+        focal = self.log_focal + float(steps[0, FOCAL])
+        return Cameras(turns @ self.rotations, self.centers + steps[:, PLACE], focal)
 
 
 @dataclass(frozen=True)
@@ -52,9 +56,9 @@ class Shot:
 class Terms:
     """What multiplies the residuals, and where the data term stops being quadratic.
 
-    ``turn`` pixels a radian and ``place`` pixels a metre, both for second differences over time; ``roll`` pixels a unit
-    of the sine of roll; ``ground`` pixels a metre below ``floor`` (metres); ``focal`` pixels a unit of log focal length
-    away from ``usual_focal`` (log pixels); ``knee`` pixels: beyond it a mark's residual counts linearly (Huber).
+    ``turn`` is in pixels a radian and ``place`` in pixels a metre, both for second differences over time; ``roll`` in
+    pixels a unit of the sine of roll, ``ground`` in pixels a metre below ``floor`` (metres), ``focal`` in pixels a unit
+    of log focal length away from ``usual_focal`` (log pixels). Beyond ``knee`` pixels a mark counts linearly (Huber).
     """
 
     turn: float
@@ -67,48 +71,60 @@ class Terms:
     knee: float = np.inf
 
 
+class Unknowns(NamedTuple):
+    """The columns that every frame has for itself, and those that the shot shares."""
+
+    own: tuple[int, ...]
+    shared: tuple[int, ...]
+
+
 @dataclass(frozen=True)
 class Normal:
-    """Normal equations: ``own`` (F, 7, 7), ``next`` (F - 1, 6, 6), ``after`` (F - 2, 6, 6), ``gradient`` (F, 7).
+    """Normal equations with l columns a frame and s shared ones: blocks of a band, and an arrow.
 
-    ``next`` and ``after`` couple a frame's unknowns with those of the next frame and of the one after it.
+    ``own`` (F, l, l), ``next`` (F - 1, l, l) and ``after`` (F - 2, l, l) couple a frame with itself, the next one and
+    the one after it; ``arrow`` (F, l, s) and ``corner`` (s, s) couple with what is shared. ``slope`` (F, l) and
+    ``shared_slope`` (s,) are the gradient.
     """
 
     own: Floats
     next: Floats
     after: Floats
-    gradient: Floats
+    arrow: Floats
+    corner: Floats
+    slope: Floats
+    shared_slope: Floats
 
 
-def seen_from(points: Floats, cameras: Cameras) -> Floats:
-    """Return ``points`` (F, N, 3) in camera axes."""
-    seen: Floats = (points - cameras.centers[:, None]) @ cameras.rotations.transpose(0, 2, 1)
-    return seen
-
-
-def reprojection(shot: Shot, cameras: Cameras) -> Floats:
-    """Return projected minus drawn marks (F, N, 2) in pixels: zero where not seen, inf where behind the camera."""
-    local = seen_from(shot.points, cameras)
+def projected(points: Floats, middle: Floats, cameras: Cameras) -> Floats:
+    """Return the pixels (F, N, 2) of ``points`` (F, N, 3): inf where behind the camera."""
+    local = _local(points, cameras)
     depth = local[..., 2:]
     with np.errstate(divide="ignore", invalid="ignore"):
-        offset = np.exp(cameras.log_focal) * local[..., :2] / depth + shot.middle - shot.marks
-    return np.where(shot.seen[..., None], np.where(depth > 1e-3, offset, np.inf), 0.0)
+        found = np.exp(cameras.log_focal) * local[..., :2] / depth + middle
+    return np.where(depth > 1e-3, found, np.inf)
 
 
-def reprojection_slopes(shot: Shot, cameras: Cameras) -> Floats:
-    """Return the derivatives (F, N, 2, 7) of `reprojection`."""
-    local = seen_from(shot.points, cameras)
-    x, y, z = np.moveaxis(np.where(shot.seen[..., None], local, (0.0, 0.0, 1.0)), -1, 0)
+def projected_slopes(points: Floats, cameras: Cameras) -> Floats:
+    """Return the derivatives (F, N, 2, 7) of `projected`; zero where behind the camera."""
+    local = _local(points, cameras)
+    ahead_of = local[..., 2:] > 1e-3
+    x, y, z = np.moveaxis(np.where(ahead_of, local, (0.0, 0.0, 1.0)), -1, 0)
     focal = np.exp(cameras.log_focal)
     u, v, by_metre = x / z, y / z, focal / z
-    slopes = np.zeros((*x.shape, 2, COLUMNS))
+    slopes = np.empty((*x.shape, 2, COLUMNS))
     slopes[..., 0, TURN] = focal * np.stack([-u * v, 1 + u * u, -v], -1)
     slopes[..., 1, TURN] = focal * np.stack([-1 - v * v, u * v, u], -1)
     right, down, ahead = (cameras.rotations[:, None, row] for row in range(3))
     slopes[..., 0, PLACE] = by_metre[..., None] * (u[..., None] * ahead - right)
     slopes[..., 1, PLACE] = by_metre[..., None] * (v[..., None] * ahead - down)
     slopes[..., 0, FOCAL], slopes[..., 1, FOCAL] = focal * u, focal * v
-    return slopes * shot.seen[..., None, None]
+    return slopes * ahead_of[..., None]
+
+
+def reprojection(shot: Shot, cameras: Cameras) -> Floats:
+    """Return projected minus drawn marks (F, N, 2) in pixels; zero where a mark is not seen."""
+    return np.where(shot.seen[..., None], projected(shot.points, shot.middle, cameras) - shot.marks, 0.0)
 
 
 def jolts(cameras: Cameras) -> tuple[Floats, Floats]:
@@ -125,11 +141,11 @@ def turn_slopes(rotations: Floats) -> Floats:
 
 
 def cost(shot: Shot, cameras: Cameras, terms: Terms) -> float:
-    """Return the sum over frames of mean squared reprojection (Huber) and the other squared residuals, pixels squared."""
+    """Return the sum over frames of the mean squared reprojection (Huber) and of the other squared residuals."""
     squared = np.sum(reprojection(shot, cameras) ** 2, axis=-1)
-    beyond = squared > terms.knee**2
-    robust = np.where(beyond, terms.knee * (2 * np.sqrt(squared) - terms.knee), squared) if beyond.any() else squared
-    total = robust.sum() / shot.seen.shape[1]
+    if not np.isfinite(squared).all():
+        return np.inf
+    total = huber(squared, terms.knee).sum() / shot.seen.shape[1]
     for scale, jolt in zip((terms.turn, terms.place), jolts(cameras), strict=True):
         total += scale**2 * np.sum(jolt**2)
     total += terms.roll**2 * np.sum(cameras.rotations[:, 0, 1] ** 2)
@@ -137,50 +153,80 @@ def cost(shot: Shot, cameras: Cameras, terms: Terms) -> float:
     return float(total + (terms.focal * (cameras.log_focal - terms.usual_focal)) ** 2)
 
 
-def normal(shot: Shot, cameras: Cameras, terms: Terms) -> Normal:
+def huber(squared: Floats, knee: float) -> Floats:
+    """Return ``squared`` distances, beyond ``knee`` growing with the distance only."""
+    if knee == np.inf:
+        return squared
+    return np.where(squared > knee**2, knee * (2 * np.sqrt(squared) - knee), squared)
+
+
+def normal(shot: Shot, cameras: Cameras, terms: Terms, unknowns: Unknowns) -> Normal:
     """Return the Gauss-Newton equations of half of `cost` at ``cameras``."""
     frames, marks = shot.seen.shape
     offset = reprojection(shot, cameras)
     length = np.linalg.norm(offset, axis=-1)
-    trust = np.where(length > terms.knee, terms.knee / np.maximum(length, 1e-300), 1.0) / marks
-    slopes = reprojection_slopes(shot, cameras).reshape(frames, 2 * marks, COLUMNS)
+    trust = shot.seen * np.where(length > terms.knee, terms.knee / np.maximum(length, 1e-300), 1.0) / marks
+    slopes = projected_slopes(shot.points, cameras)
+    slopes = slopes.reshape(frames, 2 * marks, COLUMNS)
     weighted = (slopes * np.repeat(trust, 2, axis=1)[..., None]).transpose(0, 2, 1)
-    own, gradient = weighted @ slopes, (weighted @ offset.reshape(frames, 2 * marks, 1))[..., 0]
-    result = Normal(own, np.zeros((max(frames - 1, 0), 6, 6)), np.zeros((max(frames - 2, 0), 6, 6)), gradient)
-    _add_single(result, cameras, terms)
+    whole, slope = weighted @ slopes, (weighted @ offset.reshape(frames, 2 * marks, 1))[..., 0]
+    _add_single(whole, slope, cameras, terms)
+    own, shared = unknowns
+    size = len(own)
+    result = Normal(
+        whole[:, list(own)][:, :, list(own)],
+        np.zeros((max(frames - 1, 0), size, size)),
+        np.zeros((max(frames - 2, 0), size, size)),
+        whole[:, own][:, :, shared],
+        whole[:, shared][:, :, shared].sum(axis=0),
+        slope[:, own],
+        slope[:, shared].sum(axis=0),
+    )
     if frames > 2:
-        turn_jolt, place_jolt = jolts(cameras)
-        _add_jolt(result, TURN, terms.turn, turn_jolt, turn_slopes(cameras.rotations))
-        steps = np.array([1.0, -2.0, 1.0])[:, None, None] * np.eye(3)
-        _add_jolt(result, PLACE, terms.place, place_jolt, np.broadcast_to(steps, (frames - 2, 3, 3, 3)))
+        _add_jolts(result, cameras, terms, own)
     return result
 
 
-def _add_single(result: Normal, cameras: Cameras, terms: Terms) -> None:
+def _add_single(whole: Floats, slope: Floats, cameras: Cameras, terms: Terms) -> None:
     """Add roll and ground of every frame and, to the first frame's focal column, the usual focal length."""
     sine = cameras.rotations[:, 0, 1]
     by_turn = np.zeros((len(sine), 3))
     by_turn[:, 1], by_turn[:, 2] = cameras.rotations[:, 2, 1], -cameras.rotations[:, 1, 1]
-    result.own[:, TURN, TURN] += terms.roll**2 * by_turn[:, :, None] * by_turn[:, None, :]
-    result.gradient[:, TURN] += terms.roll**2 * sine[:, None] * by_turn
+    whole[:, TURN, TURN] += terms.roll**2 * by_turn[:, :, None] * by_turn[:, None, :]
+    slope[:, TURN] += terms.roll**2 * sine[:, None] * by_turn
     below = np.maximum(0, terms.floor - cameras.centers[:, 1])
-    result.own[:, 4, 4] += terms.ground**2 * (below > 0)
-    result.gradient[:, 4] -= terms.ground**2 * below
-    result.own[0, FOCAL, FOCAL] += terms.focal**2
-    result.gradient[0, FOCAL] += terms.focal**2 * (cameras.log_focal - terms.usual_focal)
+    whole[:, PLACE, PLACE][:, 1, 1] += terms.ground**2 * (below > 0)
+    slope[:, _HEIGHT] -= terms.ground**2 * below
+    whole[0, FOCAL, FOCAL] += terms.focal**2
+    slope[0, FOCAL] += terms.focal**2 * (cameras.log_focal - terms.usual_focal)
 
 
-def _add_jolt(result: Normal, columns: slice, scale: float, jolt: Floats, slopes: Floats) -> None:
+def _add_jolts(result: Normal, cameras: Cameras, terms: Terms, own: tuple[int, ...]) -> None:
+    """Add smoothness of what every frame has for itself; of what is shared there are no differences."""
+    turn_jolt, place_jolt = jolts(cameras)
+    if set(range(6)[TURN]) <= set(own):
+        _add_jolt(result, TURN, terms.turn * turn_jolt, terms.turn * turn_slopes(cameras.rotations))
+    if set(range(6)[PLACE]) <= set(own):
+        steps = terms.place * np.array(_SECOND_DIFFERENCE)[:, None, None] * np.eye(3)
+        _add_jolt(result, PLACE, terms.place * place_jolt, np.broadcast_to(steps, (len(place_jolt), 3, 3, 3)))
+
+
+def _add_jolt(result: Normal, columns: slice, jolt: Floats, slopes: Floats) -> None:
     """Add second differences ``jolt`` (F - 2, 3) with derivatives ``slopes`` (F - 2, 3 frames, 3, 3)."""
-    slopes, jolt = scale * slopes, scale * jolt
     turned = slopes.transpose(0, 1, 3, 2)
     count = len(jolt)
     for frame in range(3):
         result.own[frame : frame + count, columns, columns] += turned[:, frame] @ slopes[:, frame]
-        result.gradient[frame : frame + count, columns] += (turned[:, frame] @ jolt[..., None])[..., 0]
+        result.slope[frame : frame + count, columns] += (turned[:, frame] @ jolt[..., None])[..., 0]
     result.next[:count, columns, columns] += turned[:, 0] @ slopes[:, 1]
     result.next[1:, columns, columns] += turned[:, 1] @ slopes[:, 2]
     result.after[:, columns, columns] += turned[:, 0] @ slopes[:, 2]
+
+
+def _local(points: Floats, cameras: Cameras) -> Floats:
+    """Return ``points`` (F, N, 3) in camera axes."""
+    local: Floats = (points - cameras.centers[:, None]) @ cameras.rotations.transpose(0, 2, 1)
+    return local
 
 
 def _turns(rotations: Floats) -> Floats:
