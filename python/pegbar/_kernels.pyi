@@ -14,11 +14,14 @@ __all__ = [
     "grow_labels",
     "has_alpha",
     "ink_alpha",
+    "length_costs",
     "lift_markers",
     "limb_depth",
+    "limb_depths",
     "matte",
     "own_alpha",
     "palette_labels",
+    "parse_amc",
     "parse_bvh",
     "pose_distance",
     "render_passes",
@@ -55,6 +58,12 @@ def lift_markers(
     prior: NDArray[np.float64],
     weights: tuple[float, float],
     subspace: tuple[NDArray[np.float64], NDArray[np.float64]],
+) -> NDArray[np.float64]: ...
+def limb_depths(
+    drawn: tuple[_Doubles, _Doubles, _Doubles, _Doubles], lengths: NDArray[np.float64]
+) -> NDArray[np.float64]: ...
+def length_costs(
+    drawn: tuple[_Doubles, _Doubles, _Doubles, _Doubles], candidates: NDArray[np.float64]
 ) -> NDArray[np.float64]: ...
 def segment_stick_figure(
     gray: NDArray[np.uint8], ends: NDArray[np.float64], half_widths: NDArray[np.float64], threshold: int
@@ -100,13 +109,14 @@ def composite_matte(
     scale: int,
 ) -> NDArray[np.float32]: ...
 def rim_depth(rendered: NDArray[Any], rendered_depth: NDArray[np.float32]) -> NDArray[np.float32] | None: ...
+def parse_amc(path: str, text: bytes, bones: list[tuple[str, int]]) -> tuple[list[str], int, int, _Doubles]: ...
 def parse_bvh(
     path: str, text: bytes
 ) -> tuple[
     tuple[list[str], list[int], _Doubles, list[int], _Doubles], tuple[list[int], NDArray[np.uint8], float, _Doubles]
 ]: ...
 def forward_kinematics(
-    joints: tuple[list[int], _Doubles, _Doubles, list[int], NDArray[np.uint8]], values: _Doubles, angle: float
+    joints: tuple[list[int], _Doubles, _Doubles, list[int], NDArray[np.uint8]], values: _Doubles, degrees: bool
 ) -> tuple[_Doubles, _Doubles]: ...
 def fit_poses(
     joints: _Doubles,

@@ -1,5 +1,6 @@
 //! `pegbar._kernels`: registers the wrappers; each file carries its kernel's name.
 
+mod amc;
 mod arrays;
 mod bvh;
 mod color;
@@ -17,7 +18,9 @@ mod palette;
 mod pose;
 mod raster;
 mod rim;
+mod search;
 mod segment;
+mod signs;
 mod warp;
 
 use pyo3::prelude::*;
@@ -25,6 +28,8 @@ use pyo3::prelude::*;
 /// The Rust kernels of pegbar. Strict and private: call the functions of the `pegbar` package instead.
 #[pymodule(gil_used = false)]
 mod _kernels {
+    #[pymodule_export]
+    use crate::amc::parse_amc;
     #[pymodule_export]
     use crate::bvh::parse_bvh;
     #[pymodule_export]
@@ -56,7 +61,11 @@ mod _kernels {
     #[pymodule_export]
     use crate::rim::rim_depth;
     #[pymodule_export]
+    use crate::search::{search_clips, segment_path};
+    #[pymodule_export]
     use crate::segment::segment_stick_figure;
+    #[pymodule_export]
+    use crate::signs::{length_costs, limb_depths};
     #[pymodule_export]
     use crate::warp::time_warp;
 }

@@ -1,5 +1,6 @@
 //! The pure kernels of pegbar, one file each, without Python. This file names the modules and defines nothing.
 
+pub mod amc;
 pub mod band;
 pub mod bvh;
 pub mod checks;
@@ -26,9 +27,11 @@ pub mod raster;
 pub mod resolve;
 pub mod rim;
 pub mod robust;
+pub mod search;
 pub mod segment;
 mod settle;
 pub mod shade;
+pub mod signs;
 pub mod surface;
 pub mod warp;
 pub mod words;

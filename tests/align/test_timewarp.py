@@ -64,7 +64,7 @@ def test_ties_go_to_the_diagonal_then_to_the_next_drawn_frame():
     assert time_warp([[0.0, 9.0, 0.0], [0.0, 0.0, 0.0]], open_end=True).path.tolist() == [[0, 0], [1, 0]]
 
 
-@given(rough)
+@given(tables)
 def test_float32_fortran_and_lists_give_the_same(cost):
     cost = cost.astype(np.float32).astype(float)
     want = time_warp(cost)

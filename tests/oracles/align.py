@@ -1,6 +1,7 @@
 """Slow transcriptions of the 2009 paper's sections 3.2-3.3: descriptor, distance, and every path of a time warp."""
 
 import cmath
+import itertools
 import math
 
 import numpy as np
@@ -41,15 +42,14 @@ def paths(rows, columns, open_begin=False, open_end=False, slope_limit=None):
         row, column = path[-1]
         if row == rows - 1 and column in ends and _gentle(path, slope_limit):
             yield path
-        for step in ((1, 1), (1, 0), (0, 1)):
-            if row + step[0] < rows and column + step[1] < columns:
-                stack.append([*path, (row + step[0], column + step[1])])
+        following = [(row + 1, column + 1), (row + 1, column), (row, column + 1)]
+        stack.extend([*path, (i, j)] for i, j in following if i < rows and j < columns)
 
 
 def _gentle(path, slope_limit):
     if slope_limit is None:
         return True
-    steps = [(b[0] - a[0], b[1] - a[1]) for a, b in zip(path, path[1:], strict=False)]
+    steps = [(b[0] - a[0], b[1] - a[1]) for a, b in itertools.pairwise(path)]
     run = []
     for step in steps:
         run = [] if step == (1, 1) else [*run, step]

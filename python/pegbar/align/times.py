@@ -31,6 +31,16 @@ def smooth_times(target: Floats, low: Floats, high: Floats, spacing: Floats, sti
     return np.clip(np.maximum.accumulate(np.clip(times, low, high)), low, high)
 
 
+def smooth_curve(values: Floats, period: float) -> Floats:
+    """Return ``values`` (F, ...) smoothed evenly over time: swings of ``period`` frames are halved."""
+    if len(values) < 3:
+        return values
+    bands = (period / (2 * np.pi)) ** 4 * _bending(np.ones(len(values) - 1))
+    bands[0] += 1
+    flat = solveh_banded(bands, values.reshape(len(values), -1), lower=True, check_finite=False)
+    return np.asarray(flat, np.float64).reshape(values.shape)
+
+
 def _bending(spacing: Floats) -> Floats:
     """Lower bands (3, F) of the matrix of the sum of squared accelerations over a time in units of the mean spacing."""
     count = len(spacing) + 1
@@ -106,10 +116,10 @@ class _Interior:
             side = self.bands[band, : len(times) - band]
             total[band:] += side * times[:-band]
             total[:-band] += side * times[band:]
-        return total
+        return np.asarray(total, np.float64)
 
 
 def _longest(values: Floats, change: Floats) -> float:
     """The longest step up to 1 that leaves ``values`` positive."""
     shrinking = change < 0
-    return float(min(1, np.min(-values[shrinking] / change[shrinking], initial=1)))
+    return float(1 / max(1, np.max(-change[shrinking] / values[shrinking], initial=1)))

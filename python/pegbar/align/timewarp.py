@@ -94,7 +94,8 @@ def time_warp(
             raise ValueError(f"{name}: want a {'positive' if name == 'slack' else 'finite'} number, got {value}")
     total, path = _kernels.time_warp(table, bool(open_begin), bool(open_end), limit)
     frames = _cheapest(table, path)
-    low, high = (_partners(path) + [-slack, slack]).clip(0, table.shape[1] - 1).T
+    first, last = _partners(path).T
+    low, high = np.maximum(first - slack, 0), np.minimum(last + slack, table.shape[1] - 1)
     times = smooth_times(frames.astype(float), low, high, spacing[:-1], stiffness)
     return TimeWarp(path, total, frames, times)
 

@@ -46,14 +46,62 @@ at least --drawings, --beauty and --output, and --drawing-depth or --labels with
 Example: pegbar composite my_shot/shot.toml --frames 1-48 --keep-going
 
 Example: pegbar composite --drawings d.####.png --drawing-depth z.####.exr --beauty b.####.exr --output o.####.png""",
+    "match": """Find the clip that a drawn sequence is like: which frames, at which time, seen from where.
+
+Reads the joint marks and every BVH, AMC and C3D file in a folder and the folders below; nothing needs to be set. Prints
+a table, and says so when nothing fits. Left and right mixed up in the drawing, and mirrored motions, are found too.
+
+Example: pegbar match my_shot/annotation.json mocap -o my_shot/match --write my_shot/shot.toml""",
+    "align": """Find the camera of every drawing, and put the drawn joints into 3D.
+
+Retimes the clip of the shot's [clip] section to the drawings (or finds one in its folder), registers cameras, and
+back-projects the marks. Writes overlays to look at, a warp plot, errors, and marks with cameras and depths, which
+pegbar depth and composite then use.
+
+Example: pegbar align my_shot/shot.toml""",
+    "motion": """Look at motion capture clips.""",
     "demo": """Make a sample shot from nothing and run every stage on it.
 
 A drawn dancer with a hoop and a ribbon.
 
 Example: pegbar demo demo""",
+    "reproduce": """Repeat an experiment of the papers on clips that you have.
+
+jain2009-table1: a walk drawn by a known camera and lifted to 3D with another walk.
+
+jain2010-fig9: how wrong a walk's depth is when it comes from other clips.
+
+foot-contact: how much better feet and knees are placed when standing feet take their depth from the floor.
+
+Tables are printed and written as CSV, plots as PNG.
+
+Example: pegbar reproduce jain2010-fig9 --data clips -o reproduced""",
+}
+#: Commands that are groups of commands: these are in the group's module.
+GROUPS = {
+    "motion": {
+        "info": """Print what clips hold and how they were understood.
+
+Frames, rate, unit, up axis, floor, facing, an inserted T-pose, joints found and missing. A clip that cannot be read is
+named and the others are still shown; the exit code is then 1.
+
+Example: pegbar motion info clips/*.bvh
+
+Example: pegbar motion info walk.bvh --joints walk.toml""",
+        "plot": """Draw poses of a clip from the front, the side and above.
+
+Left is blue and right is red, later poses are darker; the line is the floor, the grid is in metres.
+
+Example: pegbar motion plot walk.bvh -o walk.png --frames 1-120x20""",
+    }
 }
 for command, text in COMMANDS.items():
-    app.command(f"pegbar.cli.{command}:{command}", name=command, help=text)
+    if command in GROUPS:
+        app.command(App(name=command, help=text))
+        for name, help_text in GROUPS[command].items():
+            app[command].command(f"pegbar.cli.{command}:{name}", name=name, help=help_text)
+    else:
+        app.command(f"pegbar.cli.{command}:{command}", name=command, help=text)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -7,6 +7,7 @@ import os
 import re
 import tomllib
 from collections.abc import Collection, Mapping
+from difflib import get_close_matches
 from pathlib import Path
 
 from pegbar.errors import FormatError
@@ -53,7 +54,9 @@ def write_joint_map(
             lines.append(f"# {marker} is the middle of several points")
         elif marker in joint_map:
             key = marker if re.fullmatch(r"[\w-]+", marker, re.ASCII) else json.dumps(marker)
-            lines.append(f"{key} = {json.dumps(joint_map[marker], ensure_ascii=False)}")
+            # TOML's strings are JSON's, but for the character DEL.
+            text = json.dumps(joint_map[marker], ensure_ascii=False).replace("\x7f", "\\u007f")
+            lines.append(f"{key} = {text}")
         elif marker in MARKERS:
             lines.append(f'# {marker} = ""')
     atomic.write_bytes(path, (_HEAD + "\n".join(lines) + "\n").encode())
@@ -75,6 +78,13 @@ def read_joint_map(path: str | os.PathLike[str], names: Collection[str] | None =
         For text that is not TOML, a marker that is unknown or a joint that the clip does not have, with its line.
     OSError
         When the file cannot be read.
+
+    Examples
+    --------
+    >>> _ = Path("walk.toml").write_text('pelvis = "Hips"')
+    >>> read_joint_map("walk.toml", ["Hips", "Spine"])
+    {'pelvis': 'Hips'}
+    >>> Path("walk.toml").unlink()
     """
     try:
         text = Path(path).read_text(encoding="utf-8")
@@ -83,7 +93,8 @@ def read_joint_map(path: str | os.PathLike[str], names: Collection[str] | None =
         raise FormatError(path, "not UTF-8 text", byte=error.start) from None
     except tomllib.TOMLDecodeError as error:
         place = re.search(r"at line (\d+)", str(error))
-        raise FormatError(path, f"not TOML: {error}", line=int(place[1]) if place else None) from None
+        line = int(place[1]) if place else len(text.splitlines())
+        raise FormatError(path, f"not TOML: {error}", line=line) from None
     for marker, joint in table.items():
         problem = wrong_entry(marker, joint, names)
         if problem:
@@ -93,8 +104,6 @@ def read_joint_map(path: str | os.PathLike[str], names: Collection[str] | None =
 
 def wrong_entry(marker: str, joint: object, names: Collection[str] | None) -> str:
     """Return what is wrong with one line of a mapping, or ""."""
-    from difflib import get_close_matches
-
     if marker not in _KNOWN:
         near = get_close_matches(marker, _KNOWN, 1)
         return f"no marker is called {marker!r}{f' (did you mean {near[0]!r}?)' if near else ''}"

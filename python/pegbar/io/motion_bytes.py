@@ -1,14 +1,19 @@
-"""The bytes of a motion file, and names that stand once: what every reader of clips begins and ends with."""
+"""The bytes and numbers of a motion file, and names that stand once: what the readers of clips share."""
 
 from __future__ import annotations
 
+import math
 import os
+import re
 import stat
 
 from pegbar.errors import FormatError
 
 #: Larger files are refused before memory is reserved.
 MAX_BYTES = 1 << 30
+# Larger numbers are no length or angle, and sums of them would overflow.
+_LARGEST = 1e12
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?", re.ASCII | re.IGNORECASE)
 
 
 def read_bytes(path: str | os.PathLike[str]) -> bytes:
@@ -23,6 +28,22 @@ def read_bytes(path: str | os.PathLike[str]) -> bytes:
     if not data.strip():
         raise FormatError(path, "the file is empty", line=1)
     return data
+
+
+def decoded(data: bytes) -> str:
+    """Return a file's text: UTF-8, or else Latin-1, in which every byte is a letter."""
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
+
+
+def number(path: str | os.PathLike[str], word: str, line: int) -> float:
+    """Return a word as a number; what is none, not finite or absurdly large is a FormatError."""
+    value = float(word) if _NUMBER.fullmatch(word) else math.inf
+    if abs(value) > _LARGEST:
+        raise FormatError(path, f"want a number up to 1e12, got {word[:24]!r}", line=line)
+    return value
 
 
 def unique(names: list[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:

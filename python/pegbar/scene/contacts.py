@@ -67,10 +67,7 @@ def foot_contacts(markers: ArrayLike, names: Sequence[str], frame_rate: float, f
         if floor is not None and rest > floor + HIGHEST_REST:
             continue
         begin, last = ((speed < fast) & (heights < rest + high) for fast, high in (BEGIN, LAST))
-        runs, count = label(last)
-        begun = np.isin(np.arange(count + 1), runs[begin])
-        begun[0] = False
-        contacts[:, foot] = begun[runs]
+        contacts[:, foot] = runs_with(last, begin)
     return contacts
 
 
@@ -81,12 +78,26 @@ def ankle_heights(markers: ArrayLike, names: Sequence[str], contacts: ArrayLike)
     return np.array([np.median(h[s]) if s.any() else np.nan for h, s in zip(heights.T, standing.T, strict=True)])
 
 
-def _feet(markers: ArrayLike, names: Sequence[str]) -> Floats:
+def foot_places(names: Sequence[str]) -> list[int]:
+    """Where the left and the right foot are among ``names``; ValueError where one is not."""
     for foot in FEET:
         if foot not in names:
             raise ValueError(f"names: want {foot} among them, got {', '.join(names)}")
-    array = arrays.floats("markers", markers, ("F", len(names), 3), allow="nan")
-    feet: Floats = array[:, [list(names).index(foot) for foot in FEET]]
+    return [list(names).index(foot) for foot in FEET]
+
+
+def runs_with(allowed: Flags, wanted: Flags) -> Flags:
+    """Hysteresis: the runs (F,) of ``allowed`` frames that hold a frame of ``wanted``."""
+    runs, count = label(allowed)
+    chosen = np.zeros(count + 1, bool)
+    chosen[runs[allowed & wanted]] = True
+    found: Flags = chosen[runs]
+    return found
+
+
+def _feet(markers: ArrayLike, names: Sequence[str]) -> Floats:
+    places = foot_places(names)
+    feet: Floats = arrays.floats("markers", markers, ("F", len(names), 3), allow="nan")[:, places]
     return feet
 
 

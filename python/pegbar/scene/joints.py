@@ -91,8 +91,11 @@ def _first(
 
 def _swap_lone_leg(found: dict[str, int], side: str, known: Mapping[tuple[str, str], int]) -> None:
     """HumanIK's "LeftLeg" is the shin; in a skeleton without a word for the thigh it is the thigh."""
-    if f"{side}_hip" not in found and found.get(f"{side}_knee") == known.get((side, "leg"), -1):
-        found[f"{side}_hip"] = found.pop(f"{side}_knee")
+    leg = known.get((side, "leg"))
+    if leg is not None and f"{side}_hip" not in found:
+        found[f"{side}_hip"] = leg
+        if found[f"{side}_knee"] == leg:
+            del found[f"{side}_knee"]
 
 
 def _optical(found: dict[str, int], side: str, known: Mapping[tuple[str, str], int]) -> None:

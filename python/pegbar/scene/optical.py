@@ -77,6 +77,6 @@ def _hips(left: Floats, right: Floats, behind: Floats) -> tuple[Floats, Floats]:
         back = behind - middle
         back -= (back * across).sum(axis=1, keepdims=True) * across
         back /= np.linalg.norm(back, axis=1, keepdims=True)
-        down = np.cross(across, back)
+        down = np.cross(back, across)
         below = middle + width * (0.19 * back + 0.30 * down)
         return below + 0.36 * width * across, below - 0.36 * width * across

@@ -1,0 +1,161 @@
+"""The orthographic camera that a figure was drawn from, where nobody gave one (Jain, Sheikh, Hodgins 2009, section 3).
+
+The paper's artists set it by hand. Here every direction of a coarse grid is tried by the pose descriptor, and the best
+are refined until the clip's markers lie on the drawn ones.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import least_squares
+
+from pegbar import arrays
+from pegbar.align.descriptor import pose_descriptor, pose_distance
+from pegbar.align.timewarp import time_warp
+from pegbar.errors import DegenerateError
+from pegbar.scene.orthographic import OrthographicCamera
+
+Floats = NDArray[np.float64]
+#: Degrees.
+AZIMUTHS = np.arange(-180.0, 180.0, 15.0)
+ELEVATIONS = np.arange(-15.0, 61.0, 15.0)
+HIGHEST = 85.0
+#: So many of the grid's best directions are refined, each by warping and fitting in turn.
+STARTS, ROUNDS = 6, 4
+#: More frames than these are thinned out: they tell the direction no better.
+FRAMES = 80
+
+
+@dataclass(frozen=True)
+class _View:
+    """A camera's angles in degrees and scale, and its error: the residual's share of the drawings' own extent."""
+
+    azimuth: float
+    elevation: float
+    scale: float
+    error: float
+
+
+def find_orthographic(drawn: ArrayLike, points: ArrayLike, *, limbs: ArrayLike | None = None) -> OrthographicCamera:
+    """Find the orthographic camera under which a clip looks most like the drawings.
+
+    Azimuth, elevation and scale are those of the least squared distance between drawn and projected markers, every
+    frame about its own centre, so that neither the clip's travel nor the drawing's matters.
+
+    Parameters
+    ----------
+    drawn : (F, N, 2) float
+        Drawn markers in the picture's units, y down; NaN where not visible.
+    points : (F, N, 3) or (G, N, 3) float
+        The clip's markers in metres, Y up.
+    limbs : (K, 2) int, optional
+        The pose descriptor's limbs (the paper: upper arms, forearms, thighs and shins). With them the clip is
+        time-warped to the drawings for every direction that is tried; without them it is time-aligned already.
+
+    Returns
+    -------
+    OrthographicCamera
+        Its centre brings the clip's markers onto the drawn ones in the mean over all frames.
+
+    Raises
+    ------
+    ValueError
+        For a wrong shape, a number that is not finite, or without ``limbs`` a clip of another length.
+    DegenerateError
+        For drawings without extent, or fewer than two visible markers in every frame.
+
+    Examples
+    --------
+    >>> clip = np.random.default_rng(1).normal(size=(9, 6, 3))
+    >>> drawn = OrthographicCamera.from_angles(30, 10, scale=200, center=(320, 240)).project(clip)
+    >>> find_orthographic(drawn, clip)
+    OrthographicCamera(azimuth=30.0, elevation=10.0, scale=200)
+    """
+    marks = arrays.floats("drawn", drawn, ("F", "N", 2), allow="nan")
+    frames, markers = marks.shape[:2]
+    clip = arrays.floats("points", points, (frames if limbs is None else "G", markers, 3))
+    if not (np.isfinite(marks).all(axis=-1).sum(axis=1) >= 2).any() or not len(clip):
+        raise DegenerateError("drawn: want two visible markers in a frame, and a clip with frames")
+    pairs = None if limbs is None else arrays.integers("limbs", limbs, ("K", 2), low=0, high=markers - 1)
+    marks, clip = _thinned(marks), _thinned(clip)
+    starts = sorted(_grid(marks, clip, pairs))[:STARTS]
+    views = [_refined(marks, clip, pairs, azimuth, elevation) for _, azimuth, elevation in starts]
+    best = min(views, key=lambda view: view.error)
+    if not best.scale > 0:
+        raise DegenerateError("drawn: the drawings have no extent, or show nothing of the clip's pose")
+    camera = OrthographicCamera.from_angles(best.azimuth, best.elevation, best.scale)
+    offset = marks - camera.project(_aligned(marks, clip, pairs, camera))
+    return OrthographicCamera(camera.rotation, camera.scale, np.nanmean(offset, axis=(0, 1)))
+
+
+def _thinned(sequence: Floats) -> Floats:
+    return sequence[:: -(-len(sequence) // FRAMES) or 1]
+
+
+def _grid(marks: Floats, clip: Floats, limbs: NDArray[np.int64] | None) -> list[tuple[float, float, float]]:
+    """(cost, azimuth, elevation) of every direction of the grid."""
+    directions = [(azimuth, elevation) for azimuth in AZIMUTHS for elevation in ELEVATIONS]
+    if limbs is None:
+        return [(_fit(marks, clip, azimuth, elevation).error, azimuth, elevation) for azimuth, elevation in directions]
+    costs = []
+    for azimuth, elevation in directions:
+        camera = OrthographicCamera.from_angles(azimuth, elevation)
+        warp = time_warp(_cost(marks, clip, limbs, camera), stiffness=0)
+        costs.append((warp.cost / len(warp.path), azimuth, elevation))
+    return costs
+
+
+def _cost(marks: Floats, clip: Floats, limbs: NDArray[np.int64], camera: OrthographicCamera) -> Floats:
+    return pose_distance(pose_descriptor(marks, limbs), pose_descriptor(camera.project(clip), limbs))
+
+
+def _aligned(marks: Floats, clip: Floats, limbs: NDArray[np.int64] | None, camera: OrthographicCamera) -> Floats:
+    """The clip's frames (F, N, 3) that go with the drawings."""
+    return clip if limbs is None else clip[time_warp(_cost(marks, clip, limbs, camera), stiffness=0).frames]
+
+
+def _refined(marks: Floats, clip: Floats, limbs: NDArray[np.int64] | None, azimuth: float, elevation: float) -> _View:
+    view = _View(azimuth, elevation, 0.0, np.inf)
+    for _ in range(1 if limbs is None else ROUNDS):
+        poses = _aligned(marks, clip, limbs, OrthographicCamera.from_angles(view.azimuth, view.elevation))
+        angles = _best_angles(marks, poses, view)
+        fitted = _fit(marks, poses, *angles)
+        if not fitted.error < view.error - 1e-9:
+            break
+        view = fitted
+    return view
+
+
+def _best_angles(marks: Floats, poses: Floats, start: _View) -> tuple[float, float]:
+    def residuals(angles: Floats) -> Floats:
+        return _residuals(marks, poses, float(angles[0]), float(angles[1]))[0].ravel()
+
+    bounds = ([-np.inf, -HIGHEST], [np.inf, HIGHEST])
+    solved = least_squares(residuals, [start.azimuth, start.elevation], bounds=bounds, x_scale=10.0, xtol=1e-7)
+    return float(solved.x[0]), float(solved.x[1])
+
+
+def _fit(marks: Floats, poses: Floats, azimuth: float, elevation: float) -> _View:
+    residuals, scale, extent = _residuals(marks, poses, azimuth, elevation)
+    error = float(np.sum(residuals**2)) / extent if extent > 0 and scale > 0 else np.inf
+    return _View(float(azimuth), float(elevation), scale, error)
+
+
+def _residuals(marks: Floats, poses: Floats, azimuth: float, elevation: float) -> tuple[Floats, float, float]:
+    """Drawn minus projected markers, each frame about its centre; the best scale, and the drawings' squared extent."""
+    seen = np.asarray(np.isfinite(marks).all(axis=-1, keepdims=True))
+    camera = OrthographicCamera.from_angles(azimuth, elevation)
+    drawn, clip = _centred(np.where(seen, marks, 0), seen), _centred(camera.project(poses), seen)
+    size = float(np.sum(clip**2))
+    scale = max(float(np.sum(drawn * clip)) / size, 0.0) if size > 0 else 0.0
+    return drawn - scale * clip, scale, float(np.sum(drawn**2))
+
+
+def _centred(points: Floats, seen: NDArray[np.bool_]) -> Floats:
+    count = np.maximum(seen.sum(axis=1, keepdims=True), 1)
+    centre = np.sum(points * seen, axis=1, keepdims=True) / count
+    centred: Floats = (points - centre) * seen
+    return centred
