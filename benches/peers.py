@@ -2,7 +2,11 @@
 
     RAYON_NUM_THREADS=1 python benches/peers.py [name ...]
 
+<<<<<<< HEAD
 Names: composite, depth, raster, batch, motion, match, warp (default: all). Peers come with ``pip install ".[peers]"``;
+=======
+Names: composite, depth, raster, batch, motion, registration (default: all). Peers come with ``pip install ".[peers]"``;
+>>>>>>> register
 one that is missing is said and left out. The machine may be noisy: ratios are of medians within one run.
 """
 
@@ -17,7 +21,11 @@ from typing import Any
 os.environ.setdefault("RAYON_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+<<<<<<< HEAD
 NAMES = ("composite", "depth", "raster", "batch", "motion", "match", "warp")
+=======
+NAMES = ("composite", "depth", "raster", "batch", "motion", "registration")
+>>>>>>> register
 
 
 def main(names: list[str]) -> int:
