@@ -22,8 +22,7 @@ fn bench(c: &mut Criterion) {
         let (a, b_poses) = (Poses { angles: &drawn, trust: &[] }, Poses { angles: &clip, trust: &[] });
         b.iter(|| pose_distance(black_box(a), b_poses, &[1.0; LIMBS], &mut cost))
     });
-    for (name, open, slope_limit) in
-        [("closed", false, None), ("open", true, None), ("slope limit 3", false, Some(3))]
+    for (name, open, slope_limit) in [("closed", false, None), ("open", true, None), ("slope limit 3", false, Some(3))]
     {
         let rules = Rules { open_begin: open, open_end: open, slope_limit };
         group.bench_function(format!("time_warp, {name}"), |b| b.iter(|| time_warp(black_box(&cost), CLIP, rules)));

@@ -15,7 +15,7 @@ def mean_angles(angles, weights, vectors, right, down):
 
 
 def cheapest_path(costs, steps):
-    """The lowest sum of costs over all paths, by the end frame (G,): each drawn frame some steps after the one before."""
+    """The lowest sum of costs over all paths, by the end frame (G,): each drawn frame some steps on."""
     frames, length = costs.shape
     best = np.full(length, np.inf)
 

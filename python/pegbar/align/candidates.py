@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,16 +13,17 @@ from pegbar import _kernels
 from pegbar.align.marks import Marks
 from pegbar.scene.clip import Clip
 
-#: Where the camera may stand: degrees, all round and a little below to well above.
-AZIMUTHS = tuple(range(0, 360, 15))
-ELEVATIONS = (-15, 0, 15, 30)
+#: Where the camera may stand at first, in degrees. Twice as many azimuths and elevations rank the clips no better
+#: (docs/papers.md); between these the second pass climbs.
+AZIMUTHS = tuple(range(0, 360, 30))
+ELEVATIONS = (0, 20)
 # Drawings a second that the first pass looks at: half the warp's reach at the clips' 30 frames a second.
 _DRAWN_RATE = 12.5
 # Clips are taken together up to so many frames, and cut into pieces of so many: a piece's rows stay in the cache.
 _TOGETHER = 1 << 16
 _PIECE = 4096
 _PER_CLIP = 4
-# Exchanged sides must fit better by this share and angle before they are believed: a walk is nearly its own mirror image.
+# Exchanged sides must fit better by this share and angle to be believed: a walk is nearly its own mirror image.
 _EXCHANGE_SHARE, _EXCHANGE_ANGLE = 1.08, np.radians(0.4)
 
 
@@ -114,7 +116,7 @@ def line_vectors(markers: NDArray[np.float32], pairs: NDArray[np.intp]) -> NDArr
 def _search(clips: list[Clip], numbers: list[int], marks: Marks, tables: _Tables) -> Iterator[Candidate]:
     starts = np.concatenate([[0], np.cumsum([len(clip.markers) for clip in clips])])
     block = max(tables.least // 2, 8)
-    ranges = [piece for a, b in zip(starts[:-1], starts[1:], strict=True) for piece in _pieces(a, b, tables.reach)]
+    ranges = [piece for a, b in pairwise(starts.tolist()) for piece in _pieces(a, b, tables.reach)]
     vectors = np.concatenate([line_vectors(clip.markers, marks.pairs) for clip in clips], axis=2)
     axes, places = views(AZIMUTHS, ELEVATIONS)
     drawn = (tables.angles, tables.shares, tables.rows, tables.steps)
@@ -150,7 +152,7 @@ def _pieces(start: int, stop: int, reach: int) -> Iterator[tuple[int, int]]:
 
 
 def _apart(cost: NDArray[np.float32], end: NDArray[np.intp], owner: NDArray[np.intp], space: int) -> Iterator[int]:
-    """Rows with a path, the cheapest first, that do not end near a cheaper one of the same clip; a few for each clip."""
+    """Rows with a path, the cheapest first, that do not end near a cheaper one of the same clip; a few a clip."""
     taken: dict[int, list[int]] = {}
     for row in np.argsort(cost, kind="stable"):
         if not np.isfinite(cost[row]):

@@ -94,7 +94,7 @@ class Marks:
         return normed
 
     def movement(self) -> float:
-        """How far the drawings are from one held pose: the mean angle in radians to the drawing that is nearest to all."""
+        """How far the drawings are from a held pose: the mean angle in radians to the one that is nearest to all."""
         angles, shares = self.angles[0], self.shares()[0]
         candidates = range(0, len(angles), max(1, len(angles) // 24))
         return min(float((internal(angles - angles[index]) * shares).sum()) for index in candidates)

@@ -1,7 +1,7 @@
 """Which clip a drawn sequence is like: which frames, at which times, seen from where (Jain et al. 2009, s3.2-3.3).
 
-The camera is not known: every azimuth and some elevations are tried under parallel rays, with the marks as they are and with
-left and right exchanged. The cost is equation 4 as a mean: the angle between a drawn limb and the clip's.
+The camera is not known: every azimuth and some elevations are tried under parallel rays, with the marks as they are and
+with left and right exchanged. The cost is equation 4 as a mean: the angle between a drawn limb and the clip's.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 #: often right and wrong clips stay below them.
 FITS, DOUBTFUL = (4.0, 0.3), (5.0, 0.4)
 # A few drawings hold no movement that could be told from another: they are only poses.
-_POSES, FITS_POSE, DOUBTFUL_POSE = 3, 6.0, 10.0
+_POSES, FITS_POSE, DOUBTFUL_POSE = 3, 5.0, 8.0
 _SPEED = 2.0
 
 
@@ -237,9 +237,7 @@ def _limits(movement: float, drawings: int) -> tuple[float, float]:
     return FITS[0] + FITS[1] * movement, DOUBTFUL[0] + DOUBTFUL[1] * movement
 
 
-def _match(
-    clip: Clip, found: Aligned, marks: Marks, seen: NDArray[np.bool_], limits: tuple[float, float]
-) -> Match:
+def _match(clip: Clip, found: Aligned, marks: Marks, seen: NDArray[np.bool_], limits: tuple[float, float]) -> Match:
     times = clip.file_frames(found.times[marks.source])
     markers = clip.at(times)
     sides = tell_sides(markers, found.azimuth, found.elevation, bool(found.candidate.exchanged), seen)

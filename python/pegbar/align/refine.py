@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 # Frames a second at which times are found (CMU's own rate), and at which views are tried with a part of the drawings.
 _RATE, _VIEW_RATE, _DRAWN_RATE = 120.0, 60.0, 12.5
 # Degrees by which the view is moved, in turn, until no neighbour is better.
-_TURNS = (7.5, 3.75, 1.5, 0.75)
+_TURNS = (15.0, 7.5, 3.75, 1.5, 0.75)
 _LOWEST, _HIGHEST = -45.0, 60.0
 
 
@@ -92,9 +92,7 @@ class Refiner:
             ways.append((order, marks.steps(order, candidate.which, _RATE, self.speed)))
         window = _Window(clip, candidate.end, max(int(steps[:, 1].sum()) for _, steps in ways), _RATE)
         projected = pose_descriptor(camera.project(window.markers), marks.pairs)
-        table = pose_distance(
-            marks.angles[exchanged], projected, weights=marks.weights, a_trust=marks.trust[exchanged]
-        )
+        table = pose_distance(marks.angles[exchanged], projected, weights=marks.weights, a_trust=marks.trust[exchanged])
         times, best = np.zeros(len(drawings)), np.inf
         for order, steps in ways:
             path, cost = _kernels.segment_path(table[order], steps)

@@ -1,8 +1,8 @@
 """Which side is which: exchanged marks, mirrored motions, mirrored pictures.
 
 Parallel rays cannot tell a figure from its reflection in the picture plane: the view from (azimuth, elevation) is the
-mirror image of the view from (azimuth + 180, -elevation). So of the four ways in which a drawing and a clip may differ in
-left and right two and two look alike:
+mirror image of the view from (azimuth + 180, -elevation). So of the four ways in which a drawing and a clip may differ
+in left and right two and two look alike:
 
 * the clip as it is, or: picture mirrored after it was marked (the clip's mirror image, marks exchanged);
 * marks exchanged, or: the mirror image of the clip.
@@ -59,9 +59,7 @@ def mirror(markers: Floats) -> Floats:
     return reflected
 
 
-def tell_sides(
-    markers: Floats, azimuth: float, elevation: float, exchanged: bool, visible: NDArray[np.bool_]
-) -> Sides:
+def tell_sides(markers: Floats, azimuth: float, elevation: float, exchanged: bool, visible: NDArray[np.bool_]) -> Sides:
     """Return which of the two ways that look alike it is.
 
     ``markers`` (F, 16, 3) are the clip's where each drawing has it, ``visible`` (F, 16) the drawing's canonical marks

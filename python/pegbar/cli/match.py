@@ -9,7 +9,6 @@ from typing import Annotated
 
 import numpy as np
 from cyclopts import Parameter
-
 from numpy.typing import NDArray
 
 from pegbar.align.match import Matches, match_clips

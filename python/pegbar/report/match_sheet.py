@@ -1,4 +1,4 @@
-"""A contact sheet of what a search found: drawn poses in the first row, each match's poses at the same moments below."""
+"""A contact sheet of what a search found: drawn poses in the first row, each match's at the same moments below."""
 
 from __future__ import annotations
 
