@@ -53,6 +53,19 @@ def test_exchanged_marks_are_found_and_told_from_a_mirrored_motion():
     assert other.sides == "mirror image of the clip"
 
 
+@pytest.mark.parametrize("group", ["arms", "legs"])
+def test_drawings_with_mixed_up_limbs_are_named(group):
+    marks = drawn(CLIP, 40, 30, 20)
+    assert best(marks).mixed == {}
+    joints = ("shoulder", "elbow", "hand") if group == "arms" else ("hip", "knee", "foot")
+    wrong = marks.copy()
+    for joint in joints:
+        left, right = MARKERS.index(f"left_{joint}"), MARKERS.index(f"right_{joint}")
+        wrong[[7, 8, 20], left], wrong[[7, 8, 20], right] = marks[[7, 8, 20], right], marks[[7, 8, 20], left]
+    found = best(wrong)
+    assert {name: frames.tolist() for name, frames in found.mixed.items()} == {group: [7, 8, 20]}
+
+
 def test_a_mirrored_picture_is_told_by_covered_marks_only():
     marks, seen = drawn(CLIP, 40, 30, 60, 10) * [-1, 1], covered(CLIP, 40, 30, 60, 10)
     told = best(marks, visible=seen)

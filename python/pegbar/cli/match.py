@@ -60,7 +60,7 @@ def match(
         return 1
     found = _search(drawing, chosen, folder, frame_rate, top)
     report_left_out(folder.broken, {**folder.skipped, **found.skipped})
-    report_matches(folder, found)
+    report_matches(folder, found, (chosen + 1).tolist())
     if output is not None and found.matches:
         target = output / "match.png"
         output.mkdir(parents=True, exist_ok=True)
