@@ -27,6 +27,8 @@ __all__ = [
     "render_passes",
     "resolve_passes",
     "rim_depth",
+    "search_clips",
+    "segment_path",
     "segment_stick_figure",
     "stroke_polyline",
     "time_warp",

@@ -103,7 +103,7 @@ def _terms(shot: Shot, settings: Settings, start: Cameras, spread: float) -> Ter
     """Return the terms' factors; a metre has the pixels that it has at the figure."""
     weights = settings.weights
     depth = float(np.median(np.linalg.norm(figure_middles(shot) - start.centers, axis=1)))
-    turn = 2 * spread * math.sqrt(weights["smooth"]) * (settings.window / HALF_POWER) ** 2
+    turn = 1.5 * spread * math.sqrt(weights["smooth"]) * (settings.window / HALF_POWER) ** 2
     return Terms(
         turn=turn,
         place=turn / depth,

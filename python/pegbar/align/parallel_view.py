@@ -26,7 +26,7 @@ HIGHEST = 85.0
 #: So many of the grid's best directions are refined, each by warping and fitting in turn.
 STARTS, ROUNDS = 6, 4
 #: More frames than these are thinned out: they tell the direction no better.
-FRAMES = 80
+FRAMES = 120
 
 
 @dataclass(frozen=True)

@@ -49,8 +49,9 @@ def choose_root(shot: Shot, world: Floats, settings: Settings, mode: str) -> Roo
     if mode == "static":
         gain = _huber_cost(shot, whole.fit, found.noise) / max(_huber_cost(shot, found, found.noise), 1e-12)
         return Root(Choice(found, {}), share, ()) if gain > ROOT_LOSS**2 else Root(whole, 1.0, ())
-    errors = held_out_errors(with_share(shot, world, settings, share), found, settings, whole.fit.noise)
-    if errors.gain_of(whole.held_out[whole.fit.mode]) > ROOT_LOSS:
+    part = with_share(shot, world, settings, share)
+    errors = held_out_errors(part, found, settings, whole.fit.noise)
+    if errors.gain_of(min(whole.held_out.values())) > ROOT_LOSS:
         return Root(whole, 1.0, ())
     how = "in place" if share == 0 else f"with {share:.2f} of the clip's travel"
     note = f"root {how}: a still camera explains the drawings; with all of it the camera moves ({whole.fit.mode})"

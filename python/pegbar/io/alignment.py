@@ -18,10 +18,10 @@ _TEXTS = ("names", "notes")
 
 def write_alignment(path: str | os.PathLike[str], alignment: Alignment) -> None:
     """Write ``alignment`` as a .npz file whose arrays have its attributes' names, complete or not at all."""
-    values = {field.name: np.asarray(getattr(alignment, field.name)) for field in fields(alignment)}
-    texts = {name: np.asarray(getattr(alignment, name), dtype=np.str_) for name in _TEXTS}
+    values: dict[str, Any] = {field.name: np.asarray(getattr(alignment, field.name)) for field in fields(alignment)}
+    values |= {name: np.asarray(getattr(alignment, name), dtype=np.str_) for name in _TEXTS}
     with complete_file(path) as part, part.open("wb") as file:
-        np.savez_compressed(file, **{**values, **texts})
+        np.savez_compressed(file, **values)
 
 
 def read_alignment(path: str | os.PathLike[str]) -> Alignment:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import label
+from scipy.ndimage import distance_transform_edt, label, mean
 
 from pegbar.lift.projection import known
 
@@ -16,6 +16,8 @@ TAPER = 4
 ROUNDS = 30
 #: Metres to which lengths are met.
 EXACT = 1e-11
+#: Frames worked at a time, for memory.
+CHUNK = 512
 
 
 def planted_targets(points: Floats, planted: NDArray[np.bool_], held: Floats | None) -> Floats:
@@ -27,18 +29,16 @@ def planted_targets(points: Floats, planted: NDArray[np.bool_], held: Floats | N
     fixed = np.full(points.shape, np.nan)
     for marker in np.flatnonzero(planted.any(axis=0)):
         runs, count = label(planted[:, marker])
-        for run in range(1, count + 1):
-            fixed[runs == run, marker] = points[runs == run, marker].mean(axis=0)
+        places = [mean(points[:, marker, axis], runs, np.arange(1, count + 1)) for axis in range(3)]
+        fixed[runs > 0, marker] = np.transpose(places)[runs[runs > 0] - 1]
     if held is not None:
         fixed = np.where(np.isfinite(held), held, fixed)
     targets = fixed.copy()
     for marker in np.flatnonzero(known(fixed).any(axis=0)):
-        frames = np.flatnonzero(known(fixed[:, marker]))
-        for frame in np.setdiff1d(np.arange(len(points)), frames):
-            nearest = frames[np.argmin(np.abs(frames - frame))]
-            share = 1 - abs(int(nearest) - frame) / (TAPER + 1)
-            if share > 0:
-                targets[frame, marker] = points[frame, marker] + share * (fixed - points)[nearest, marker]
+        away, (nearest,) = distance_transform_edt(~known(fixed[:, marker]), return_indices=True)
+        near = (away > 0) & (away <= TAPER)
+        steps = (fixed - points)[nearest[near], marker]
+        targets[near, marker] = points[near, marker] + (1 - away[near] / (TAPER + 1))[:, None] * steps
     return targets
 
 
@@ -48,6 +48,14 @@ def meet_lengths(points: Floats, rays: Floats, limbs: NDArray[np.int64], lengths
     Newton's method on the lengths; a move along the unit ``rays`` (F, N, 3) counts less than one across them. Where
     targets are farther apart than limbs reach, the targets are kept.
     """
+    met = points.copy()
+    for start in range(0, len(points), CHUNK):
+        part = slice(start, start + CHUNK)
+        met[part] = _meet(points[part], rays[part], limbs, lengths[part], targets[part])
+    return met
+
+
+def _meet(points: Floats, rays: Floats, limbs: NDArray[np.int64], lengths: Floats, targets: Floats) -> Floats:
     pinned = known(targets)
     met: Floats = np.where(pinned[..., None], targets, points)
     give = np.eye(3) + (DEPTH_GIVES**2 - 1) * rays[..., :, None] * rays[..., None, :]

@@ -68,9 +68,10 @@ def refine_markers(given: Given, options: Refinement) -> tuple[Floats, Floats]:
         targets = planted_targets(figure.points, planted, options.held)
     if options.stretch:
         return np.where(np.isfinite(targets), targets, figure.points), solved
-    if rings or np.isfinite(targets).any():
-        ends, linked = np.concatenate([ends, limbs[rings]]), np.concatenate([linked, solved[:, rings].T])
-        figure.points = meet_lengths(figure.points, figure.smooth[1], ends, linked.T, targets)
+    moved = slice(None) if rings else np.flatnonzero(known(targets).any(axis=1))
+    ends, linked = np.concatenate([ends, limbs[rings]]), np.concatenate([linked, solved[:, rings].T])
+    rays, spans = figure.smooth[1][moved], linked.T[moved]
+    figure.points[moved] = meet_lengths(figure.points[moved], rays, ends, spans, targets[moved])
     return figure.points, solved
 
 

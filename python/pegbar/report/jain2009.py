@@ -136,7 +136,7 @@ def walk_poses(motion: Motion) -> Floats:
 def lift_walk(
     truth: Floats, clip: Floats, angles: tuple[float, float], *, offset: tuple[int, int] = (0, 0), noise: float = 0
 ) -> Lifted:
-    """Draw ``truth`` from ``angles`` with ``noise`` in pixels, and lift it by a camera that is ``offset`` degrees off."""
+    """Draw ``truth`` from ``angles`` with ``noise`` in pixels; lift it by a camera that is ``offset`` degrees off."""
     drawn = OrthographicCamera.from_angles(*angles).project(truth)
     drawn = drawn + noise * METRES_PER_PIXEL * np.random.default_rng(0).normal(size=drawn.shape)
     camera = OrthographicCamera.from_angles(angles[0] + offset[0], angles[1] + offset[1])

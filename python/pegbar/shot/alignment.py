@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pegbar.align.camera_track import CameraTrack
 from pegbar.align.descriptor import limb_trust, pose_descriptor, pose_distance
-from pegbar.align.registration import Mode, Root, register_cameras
+from pegbar.align.registration import register_cameras
 from pegbar.align.retime import retime, sample_markers
 from pegbar.align.timewarp import TimeWarp, time_warp
 from pegbar.lift.backprojection import back_project
@@ -58,8 +59,8 @@ class AlignOptions:
     """
 
     field_of_view: float | None = None
-    mode: Mode = "auto"
-    root: Root = "auto"
+    mode: Literal["auto", "static", "pan", "free"] = "auto"
+    root: Literal["auto", "travel", "in_place"] | float = "auto"
     smoothing: float = 0.0
     root_smoothing: float = 0.25
     ground: bool = False

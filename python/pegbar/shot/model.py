@@ -125,8 +125,8 @@ class AlignSection(Section):
     """``[align]``: how the camera is found and the drawing's joints are put into 3D."""
 
     output: str = "align"
-    mode: Literal["auto", "static", "pan", "free", "given"] = "auto"
-    root: Literal["auto", "travel", "in_place"] = "auto"
+    mode: Literal["auto", "static", "pan", "free"] = "auto"
+    root: Literal["auto", "travel", "in_place"] | Annotated[float, Field(ge=0, le=1)] = "auto"
     field_of_view: float | None = Field(None, gt=0, lt=180)
     smoothing: float = Field(0.0, ge=0, allow_inf_nan=False)
     root_smoothing: float = Field(0.25, ge=0, allow_inf_nan=False)
@@ -169,7 +169,7 @@ class ShotFile(Section):
     shot: ShotSection = Field(default_factory=ShotSection)
     drawing: DrawingSection
     clip: ClipSection | None = None
-    align: AlignSection = Field(default_factory=AlignSection)
+    align: AlignSection = AlignSection()
     camera: CameraSection | None = None
     passes: PassesSection | None = None
     output: OutputSection = Field(default_factory=OutputSection)
