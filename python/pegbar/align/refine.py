@@ -24,7 +24,7 @@ _LOWEST, _HIGHEST = -45.0, 60.0
 
 @dataclass(frozen=True, eq=False)
 class Aligned:
-    """A candidate seen from its best side: clip frame of every drawing (F,), angles and differences (F, K) in radians."""
+    """A candidate from its best side: clip frame of every drawing (F,), angles and differences (F, K) in radians."""
 
     candidate: Candidate
     azimuth: float

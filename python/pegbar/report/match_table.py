@@ -77,7 +77,8 @@ def _summary(found: Matches, drawings: Sequence[int]) -> str:
     elif best.swapped:
         words.append("Left and right seem to be exchanged in the drawing" + _unsure(best) + ".")
     elif best.mirrored:
-        words.append("The drawing is like the clip's mirror image.")
+        otherwise = "" if best.sides_told else ", or left and right are exchanged in it"
+        words.append(f"The drawing is like the clip's mirror image{otherwise}.")
     for group, frames in best.mixed.items():
         numbers = format_frames(drawings[frame] for frame in frames)
         words.append(f"In drawing {numbers} the {group} seem to be marked on the wrong sides.")
