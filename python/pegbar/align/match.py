@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pegbar import arrays
-from pegbar.align.candidates import find_candidates
+from pegbar.align.candidates import believed, find_candidates
 from pegbar.align.marks import EXCHANGED, Marks, read_marks
 from pegbar.align.mixed import mixed_up
 from pegbar.align.refine import Aligned, Refiner
@@ -189,7 +189,7 @@ def match_clips(
     candidates = find_candidates(searched, marks, speed, max(3 * top, 24))
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         refined = list(pool.map(lambda c: (searched[c.clip], refiner.refine(searched[c.clip], c)), candidates))
-    aligned = sorted(((clip, found) for clip, found in refined if found), key=lambda pair: pair[1].cost)
+    aligned = sorted(((clip, found) for clip, found in refined if found), key=_rank)
     movement = float(np.degrees(marks.movement()))
     limits = _limits(movement, len(marks.times[0]))
     kept: list[Match] = []
@@ -266,6 +266,10 @@ def _match(clip: Clip, found: Aligned, marks: Marks, seen: NDArray[np.bool_], li
         verdict=verdict,
         mixed=_mixed(found, marks) if verdict == "fits" else {},
     )
+
+
+def _rank(pair: tuple[Clip, Aligned]) -> float:
+    return believed(pair[1].cost, pair[1].candidate.exchanged)
 
 
 def _mixed(found: Aligned, marks: Marks) -> dict[str, NDArray[np.intp]]:
