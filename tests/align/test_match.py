@@ -72,7 +72,9 @@ def test_the_matched_markers_lie_on_the_drawing(kind):
         marks = marks * [-1, 1]
     found = best(marks, visible=seen)
     points = found.camera.project(found.markers(CLIP))
-    pairs = [(MARKERS.index(a), MARKERS.index(b)) for a, b in (("left_hip", "left_knee"), ("right_elbow", "right_hand"))]
+    pairs = [
+        (MARKERS.index(a), MARKERS.index(b)) for a, b in (("left_hip", "left_knee"), ("right_elbow", "right_hand"))
+    ]
     distance = np.diagonal(pose_distance(pose_descriptor(marks, pairs), pose_descriptor(points, pairs)))
     assert np.degrees(distance.mean()) / 2 < 3
 

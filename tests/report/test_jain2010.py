@@ -67,7 +67,7 @@ def test_what_is_missing_is_named(tmp_path, capsys):
     assert main(["reproduce", "jain2010-fig9", "--data", str(tmp_path)]) == 2
     assert "lacks the CMU clip 35_01 (cmu_35_01.bvh, 35_01.bvh or 35_01.amc)" in capsys.readouterr().err
     assert main(["reproduce", "fig9", "--data", str(tmp_path)]) == 2
-    assert "want jain2010-fig9 or " in capsys.readouterr().err
+    assert "jain2010-fig9 or foot-contact, got fig9" in capsys.readouterr().err
 
 
 def test_clips_are_found_in_folders_bvh_before_amc(tmp_path):

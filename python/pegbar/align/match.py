@@ -237,9 +237,7 @@ def _limits(movement: float, drawings: int) -> tuple[float, float]:
     return FITS[0] + FITS[1] * movement, DOUBTFUL[0] + DOUBTFUL[1] * movement
 
 
-def _match(
-    clip: Clip, found: Aligned, marks: Marks, seen: NDArray[np.bool_], limits: tuple[float, float]
-) -> Match:
+def _match(clip: Clip, found: Aligned, marks: Marks, seen: NDArray[np.bool_], limits: tuple[float, float]) -> Match:
     times = clip.file_frames(found.times[marks.source])
     markers = clip.at(times)
     sides = tell_sides(markers, found.azimuth, found.elevation, bool(found.candidate.exchanged), seen)

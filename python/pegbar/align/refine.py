@@ -92,9 +92,7 @@ class Refiner:
             ways.append((order, marks.steps(order, candidate.which, _RATE, self.speed)))
         window = _Window(clip, candidate.end, max(int(steps[:, 1].sum()) for _, steps in ways), _RATE)
         projected = pose_descriptor(camera.project(window.markers), marks.pairs)
-        table = pose_distance(
-            marks.angles[exchanged], projected, weights=marks.weights, a_trust=marks.trust[exchanged]
-        )
+        table = pose_distance(marks.angles[exchanged], projected, weights=marks.weights, a_trust=marks.trust[exchanged])
         times, best = np.zeros(len(drawings)), np.inf
         for order, steps in ways:
             path, cost = _kernels.segment_path(table[order], steps)

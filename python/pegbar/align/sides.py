@@ -59,9 +59,7 @@ def mirror(markers: Floats) -> Floats:
     return reflected
 
 
-def tell_sides(
-    markers: Floats, azimuth: float, elevation: float, exchanged: bool, visible: NDArray[np.bool_]
-) -> Sides:
+def tell_sides(markers: Floats, azimuth: float, elevation: float, exchanged: bool, visible: NDArray[np.bool_]) -> Sides:
     """Return which of the two ways that look alike it is.
 
     ``markers`` (F, 16, 3) are the clip's where each drawing has it, ``visible`` (F, 16) the drawing's canonical marks

@@ -129,9 +129,7 @@ def _unchanged(root: Path, path: Path, entry: Entry) -> tuple[File, ...] | None:
     return tuple(now)
 
 
-def _read_all(
-    root: Path, paths: list[Path], progress: Callable[[int, int], None] | None
-) -> dict[str, Entry]:
+def _read_all(root: Path, paths: list[Path], progress: Callable[[int, int], None] | None) -> dict[str, Entry]:
     entries: dict[str, Entry] = {}
     with ThreadPoolExecutor(min(len(paths), os.cpu_count() or 1) or 1) as pool:
         for entry in pool.map(lambda path: _read(root, path), paths):

@@ -31,7 +31,18 @@ def report_matches(folder: ClipFolder, found: Matches) -> None:
 
     clips = {clip.name: clip for clip in folder.clips}
     table = Table(box=None, pad_edge=False, header_style="bold")
-    for name in ("", "clip", "frames", "seconds", "azimuth", "elevation", "seen from", "left and right", "degrees", "verdict"):
+    for name in (
+        "",
+        "clip",
+        "frames",
+        "seconds",
+        "azimuth",
+        "elevation",
+        "seen from",
+        "left and right",
+        "degrees",
+        "verdict",
+    ):
         numeric = name in ("", "frames", "seconds", "azimuth", "elevation", "degrees")
         table.add_column(name, justify="right" if numeric else "left", no_wrap=True)
     for rank, match in enumerate(found.matches, 1):
