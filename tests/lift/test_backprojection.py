@@ -143,7 +143,7 @@ def test_the_pixels_origin_does_not_matter(form):
     markers, matrices, depths = shot(11, 5, 2)
     shift = np.array([[1, 0, 5000], [0, 1, -800], [0, 0, 1.0]])
     want = back_project(markers, matrices, depths, smoothing=1.0, form=form)
-    got = back_project(markers + [5000, -800], shift @ np.array(matrices), depths, smoothing=1.0, form=form)
+    got = back_project(np.add(markers, [5000, -800]), shift @ np.array(matrices), depths, smoothing=1.0, form=form)
     np.testing.assert_allclose(got, want, atol=1e-9)
 
 

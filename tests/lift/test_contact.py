@@ -31,7 +31,7 @@ def grounded(points, depths, **options):
 def test_standing_feet_are_found_in_the_drawing_and_their_depth_is_mended():
     points, standing = walk()
     truth = CAMERA.depth(points)
-    wrong = truth + [0, 0.05, 0.1, -0.12]
+    wrong = np.add(truth, [0, 0.05, 0.1, -0.12])
     found = grounded(points, wrong, noise=ContactNoise(depth=1.0, height=1e-3, mark=0.1))
     assert (found.standing == standing).mean() > 0.9
     assert not (found.standing & ~standing).any()
@@ -43,9 +43,7 @@ def test_standing_feet_are_found_in_the_drawing_and_their_depth_is_mended():
 def test_what_is_known_is_weighted():
     points, standing = walk()
     truth = CAMERA.depth(points)
-    wrong = truth + [0, 0, 0.1, 0.1]
-    slope = -CAMERA.unproject([0, 0], 1)[1] + CAMERA.position[1]
-    assert slope > 0.1
+    wrong = np.add(truth, [0, 0, 0.1, 0.1])
     sure, unsure = (grounded(points, wrong, standing=standing, noise=ContactNoise(depth=d)) for d in (10.0, 1e-4))
     np.testing.assert_allclose(sure.depths[:, 2:], truth[:, 2:], atol=1e-3)
     np.testing.assert_allclose(unsure.depths, wrong, atol=1e-3)

@@ -34,7 +34,7 @@ def test_figure_9_comes_out_in_the_papers_order(motions):
 
 
 def test_depth_of_the_walk_itself_is_without_error(motions):
-    same = {clip: motions[TRUTH] for clip in motions}
+    same = dict.fromkeys(motions, motions[TRUTH])
     result = figure9(same, registered=False)
     assert result.mean("three-quarter", "35_01") < 1e-12
 
