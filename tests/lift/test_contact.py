@@ -131,3 +131,23 @@ def test_wrong_arguments_are_named(name, change):
     }
     with pytest.raises(ValueError, match=f"^{name}: "):
         ground_depths(**good | change)
+
+
+@pytest.mark.parametrize("distance", [2.0, 15.0])
+@pytest.mark.parametrize(("speed", "stands"), [(0.2, True), (0.32, False), (0.5, False)])
+def test_speed_counts_in_metres_at_any_distance(distance, speed, stands):
+    camera = PerspectiveCamera.look_at((0, distance, distance), (0, 0, 0), (960, 540), 0.8)
+    points = np.tile([0, 0.08, 0], (24, 4, 1))
+    points[:, 2:, 0] += (np.arange(24) - 12)[:, None] * speed / 24
+    depths = camera.depth(points)
+    found = ground_depths(camera.project(points), [camera.matrix] * 24, depths, NAMES, 24.0)
+    assert found.standing.all() if stands else not found.standing.any()
+
+
+def test_a_mark_above_the_horizon_meets_no_floor():
+    camera = PerspectiveCamera.look_at((0, 2, 5), (0, 2, 0), (960, 540), 0.8)
+    points = np.tile([0, 2.5, 0], (6, 4, 1))
+    depths = camera.depth(points)
+    standing = np.ones((6, 2), bool)
+    found = ground_depths(camera.project(points), [camera.matrix] * 6, depths, NAMES, 24.0, standing=standing)
+    np.testing.assert_array_equal(found.depths, depths)
