@@ -18,7 +18,7 @@ from pegbar.lift.pins import meet_lengths, planted_targets
 from pegbar.lift.projection import known
 from pegbar.lift.rays import fill_marks, mark_noise, metres_per_unit, project, sight_rays, smooth_marks
 from pegbar.lift.rigid import LimbTracks, rigid_limbs
-from pegbar.lift.tree import Link, limb_tree
+from pegbar.scene.limb_tree import Link, limb_tree
 
 Floats = NDArray[np.float64]
 #: Natural motion at usual frame rates looks like noise of this part of all limbs' length together.
@@ -33,6 +33,10 @@ LEAST_JOLT, LEAST_DOUBT = 2e-3, 2e-2
 DOUBT = 2.0
 #: A rigid limb may jolt this many times more than the clip's does.
 LOOSER = 2.0
+
+
+#: Metres.
+NO_LENGTH = 1e-4
 
 
 @dataclass
@@ -190,13 +194,15 @@ def _jolts(tracks: Floats) -> Floats:
 
 
 def _level_lengths(level: _Level, lengths: Floats | None) -> Floats:
-    """The lengths (links, F), given or as the drawings say; a link of no length in the clip has none."""
+    """The lengths (links, F), given or as the drawings say; a link without length in clip and drawings has none."""
     found = np.empty_like(level.drawn[0])
     told = np.array([lengths is not None and limb >= 0 for _, _, limb in level.links])
     if not told.all():
         planar, clip, noise, scales = (rows[~told] for rows in level.drawn)
         spans = level.spans[~told]
-        found[~told] = np.where(spans > 1e-6, likely_lengths((planar, clip, noise, scales), spans), 0.0)[:, None]
+        seen = np.sqrt(np.mean(planar**2, axis=1)) > 3 * np.median(noise, axis=1) + NO_LENGTH
+        likely = likely_lengths((planar, clip, noise, scales), spans)
+        found[~told] = np.where(seen | (spans > NO_LENGTH), likely, 0.0)[:, None]
     if lengths is not None:
         found[told] = lengths[:, [limb for _, _, limb in level.links if limb >= 0]].T
     return found
