@@ -27,6 +27,8 @@ __all__ = [
     "render_passes",
     "resolve_passes",
     "rim_depth",
+    "search_clips",
+    "segment_path",
     "segment_stick_figure",
     "stroke_polyline",
     "time_warp",
@@ -116,7 +118,7 @@ def parse_bvh(
     tuple[list[str], list[int], _Doubles, list[int], _Doubles], tuple[list[int], NDArray[np.uint8], float, _Doubles]
 ]: ...
 def forward_kinematics(
-    joints: tuple[list[int], _Doubles, _Doubles, list[int], NDArray[np.uint8]], values: _Doubles, angle: float
+    joints: tuple[list[int], _Doubles, _Doubles, list[int], NDArray[np.uint8]], values: _Doubles, degrees: bool
 ) -> tuple[_Doubles, _Doubles]: ...
 def fit_poses(
     joints: _Doubles,
@@ -127,3 +129,11 @@ def pose_distance(a: _Doubles, b: _Doubles, weights: _Doubles, a_trust: _Doubles
 def time_warp(
     cost: _Doubles, open_begin: bool, open_end: bool, slope_limit: int | None
 ) -> tuple[float, NDArray[np.int64]]: ...
+def search_clips(
+    vectors: _Floats,
+    ranges: NDArray[np.uint64],
+    views: _Floats,
+    drawn: tuple[_Floats, _Floats, NDArray[np.uint32], NDArray[np.uint32]],
+    block: int,
+) -> tuple[_Floats, NDArray[np.uint32]]: ...
+def segment_path(costs: _Doubles, steps: NDArray[np.uint32]) -> tuple[NDArray[np.uint32], float]: ...

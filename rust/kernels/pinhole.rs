@@ -17,6 +17,7 @@ const ENTRIES: usize = UNKNOWNS * (UNKNOWNS + 1) / 2;
 const NEAR: f64 = 0.05;
 
 /// What the cameras are fitted to: eight poses and one set of marks.
+#[derive(Clone, Copy)]
 pub struct Target<'a> {
     /// The poses' points about their middle, in metres.
     pub points: &'a [[Lanes; 3]],
@@ -58,6 +59,7 @@ pub struct Normal {
 }
 
 /// Place in the packed lower triangle.
+#[inline(always)]
 const fn at(row: usize, column: usize) -> usize {
     row * (row + 1) / 2 + column
 }
@@ -178,17 +180,26 @@ impl Normal {
             }
             self.matrix[at(3, 3)] = Lanes::splat(1.0);
         }
-        // The world's up in camera axes; upright is (0, -1, 0), and only a roll or a dive moves its first two numbers.
+        // The world's up in camera axes: (0, -cos e, sin e) without roll, whatever the elevation e. A camera upside
+        // down is as level as an upright one, so there the second number counts as well.
         let [ux, uy, uz] = camera.rotation.map(|row| row[1]);
-        let pull = Lanes::splat(target.upright_weight * target.upright_weight);
-        let dive = uy + Lanes::splat(1.0);
-        self.cost = self.cost + pull * (ux * ux + dive * dive);
-        let (dx, dy) = ([Lanes::ZERO, uz, -uy], [-uz, Lanes::ZERO, ux]);
+        let flipped = Lanes::ZERO.below(uy);
+        let where_flipped = |value: Lanes| value.or(&flipped, Lanes::ZERO);
+        self.pull(target.upright_weight, ux, [Lanes::ZERO, uz, -uy]);
+        self.pull(target.upright_weight, where_flipped(uy), [where_flipped(-uz), Lanes::ZERO, where_flipped(ux)]);
+    }
+
+    /// Adds a residual with its weight and its slopes along the turn.
+    #[inline(always)]
+    fn pull(&mut self, weight: f64, residual: Lanes, slopes: [Lanes; 3]) {
+        let pull = Lanes::splat(weight * weight);
+        self.cost = self.cost + pull * residual * residual;
         for row in 0..3 {
-            self.gradient[row + 4] = self.gradient[row + 4] + pull * (dx[row] * ux + dy[row] * dive);
+            let weighted = pull * slopes[row];
+            self.gradient[row + 4] = self.gradient[row + 4] + weighted * residual;
             for column in 0..=row {
                 let entry = at(row + 4, column + 4);
-                self.matrix[entry] = self.matrix[entry] + pull * (dx[row] * dx[column] + dy[row] * dy[column]);
+                self.matrix[entry] = self.matrix[entry] + weighted * slopes[column];
             }
         }
     }
@@ -239,5 +250,124 @@ impl Normal {
             *out = out.or(mask, other);
         }
         out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LOSSES: [Loss; 4] = [Loss::Squared, Loss::Huber, Loss::Cauchy, Loss::GemanMcClure];
+
+    /// A point for every lane, different in each.
+    fn points(count: usize) -> Vec<[Lanes; 3]> {
+        let wave = |k: usize, lane: usize| ((k * 37 + lane * 11) as f64 * 0.61).sin();
+        let lanes = |k: usize| Lanes(std::array::from_fn(|lane| wave(k, lane)));
+        (0..count).map(|joint| [lanes(3 * joint), lanes(3 * joint + 1), lanes(3 * joint + 2)]).collect()
+    }
+
+    fn cameras() -> Cameras {
+        let lanes = |from: f64, by: f64| Lanes(std::array::from_fn(|lane| from + by * lane as f64));
+        let rotation = [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]].map(|row| row.map(Lanes::splat));
+        let level = Cameras {
+            rotation,
+            shift: [lanes(-9.0, 4.0), lanes(20.0, -6.0)],
+            log_scale: lanes(4.6, 0.05),
+            log_focal: lanes(6.2, 0.07),
+        };
+        level.moved(&[0.0, 0.0, 0.0, 0.0, 0.3, -0.9, 0.2].map(Lanes::splat)).moved(&step(5, lanes(0.0, 0.1)))
+    }
+
+    fn target<'a>(points: &'a [[Lanes; 3]], marks: &'a [[f64; 2]], loss: Loss) -> Target<'a> {
+        Target { points, marks, loss, scale: 12.0, log_focal: 6.3, focal_weight: Some(3.0), upright_weight: 8.0 }
+    }
+
+    fn step(unknown: usize, size: Lanes) -> [Lanes; UNKNOWNS] {
+        let mut step = [Lanes::ZERO; UNKNOWNS];
+        step[unknown] = size;
+        step
+    }
+
+    fn cost(target: &Target, camera: &Cameras, step: &[Lanes; UNKNOWNS]) -> Lanes {
+        camera.moved(step).normal(target).cost
+    }
+
+    #[test]
+    fn gradient_is_that_of_the_cost_by_finite_differences() {
+        let (points, marks) =
+            (points(6), [[-60.0, -90.0], [50.0, 9.0], [0.0, 80.0], [9.0, -4.0], [70.0, 2.0], [-33.0, 50.0]]);
+        let upside_down = cameras().moved(&step(6, Lanes::splat(1.0))).moved(&step(6, Lanes::splat(1.0)));
+        for (loss, camera) in LOSSES.into_iter().flat_map(|loss| [(loss, cameras()), (loss, upside_down)]) {
+            let target = target(&points, &marks, loss);
+            let normal = camera.normal(&target);
+            for unknown in 0..UNKNOWNS {
+                let small = Lanes::splat(1e-6);
+                let (up, down) =
+                    (cost(&target, &camera, &step(unknown, small)), cost(&target, &camera, &step(unknown, -small)));
+                for lane in 0..LANES {
+                    let (want, got) = ((up.0[lane] - down.0[lane]) / 4e-6, normal.gradient[unknown].0[lane]);
+                    assert!((want - got).abs() < 1e-5 * (1.0 + want.abs()), "{loss:?} {unknown}: {got} for {want}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn matrix_is_half_the_second_derivative_where_nothing_is_off() {
+        let points = points(5);
+        let camera = Cameras { log_focal: Lanes::splat(6.3), ..cameras() };
+        let level = [[0.6, 0.0, -0.8], [0.0, -1.0, 0.0], [-0.8, 0.0, -0.6]].map(|row| row.map(Lanes::splat));
+        let camera = Cameras { rotation: level, ..camera };
+        // Each lane has its own marks, so each is looked at alone.
+        for lane in 0..LANES {
+            let marks: Vec<[f64; 2]> = points.iter().map(|point| project(&camera, point, lane)).collect();
+            let target = target(&points, &marks, Loss::Cauchy);
+            let normal = camera.normal(&target);
+            let size = |unknown: usize| Lanes::splat(if unknown < 2 { 1e-2 } else { 1e-4 });
+            for (row, column) in (0..UNKNOWNS).flat_map(|row| (0..=row).map(move |column| (row, column))) {
+                let both = |sign: f64| {
+                    let mut both = step(row, size(row));
+                    both[column] = both[column] + size(column) * Lanes::splat(sign);
+                    cost(&target, &camera, &both).0[lane]
+                };
+                let want = if row == column { both(1.0) / 4.0 } else { (both(1.0) - both(-1.0)) / 4.0 };
+                let want = want / (size(row).0[0] * size(column).0[0]);
+                let got = normal.matrix[at(row, column)].0[lane];
+                let size = (normal.matrix[at(row, row)].0[lane] * normal.matrix[at(column, column)].0[lane]).sqrt();
+                assert!((want - got).abs() < 1e-3 * size, "{row} {column}: {got} for {want} of {size}");
+            }
+        }
+    }
+
+    /// Where a lane's camera sees its point: K [R | t] written out.
+    fn project(camera: &Cameras, point: &[Lanes; 3], lane: usize) -> [f64; 2] {
+        let turned = camera.rotation.map(|row| (0..3).map(|k| row[k].0[lane] * point[k].0[lane]).sum::<f64>());
+        let (focal, depth) =
+            (camera.log_focal.0[lane].exp(), (camera.log_focal.0[lane] - camera.log_scale.0[lane]).exp());
+        let place = [camera.shift[0].0[lane] * depth / focal, camera.shift[1].0[lane] * depth / focal];
+        [0, 1].map(|axis| focal * (turned[axis] + place[axis]) / (turned[2] + depth))
+    }
+
+    #[test]
+    fn step_solves_the_damped_equations_and_a_given_focal_length_stays() {
+        let (points, marks) = (points(5), [[-60.0, -90.0], [50.0, 9.0], [0.0, 80.0], [9.0, -4.0], [70.0, 2.0]]);
+        for focal_weight in [Some(3.0), None] {
+            let normal = cameras().normal(&Target { focal_weight, ..target(&points, &marks, Loss::Huber) });
+            let step = normal.step(Lanes::splat(0.25));
+            for row in 0..UNKNOWNS {
+                let entry = |column: usize| normal.matrix[at(row.max(column), row.min(column))].0[3];
+                let damped = |column: usize| entry(column) * if row == column { 1.25 } else { 1.0 };
+                let sum: f64 = (0..UNKNOWNS).map(|column| damped(column) * step[column].0[3]).sum();
+                assert!((sum + normal.gradient[row].0[3]).abs() < 1e-9 * (1.0 + sum.abs()));
+            }
+            assert_eq!(step[3].0 == [0.0; LANES], focal_weight.is_none());
+        }
+    }
+
+    #[test]
+    fn a_point_behind_the_camera_costs_without_end() {
+        let points = [[Lanes::ZERO, Lanes::ZERO, Lanes([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1e3])]];
+        let cost = cameras().normal(&target(&points, &[[0.0, 0.0]], Loss::GemanMcClure)).cost;
+        assert!(cost.0[..7].iter().all(|cost| cost.is_finite()) && cost.0[7] == f64::INFINITY);
     }
 }

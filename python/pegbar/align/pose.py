@@ -18,7 +18,7 @@ Loss = Literal["squared", "huber", "cauchy", "geman_mcclure"]
 USUAL_FIELD_OF_VIEW = math.radians(40)
 FOCAL_SPREAD = 0.35
 #: How far a camera is usually from upright, in radians.
-UPRIGHT_SPREAD = math.radians(20)
+UPRIGHT_SPREAD = math.radians(5)
 #: The loss's scale as part of the marks' extent.
 SCALE = 0.015
 #: Marks narrower than this part of their length lie on one line.
