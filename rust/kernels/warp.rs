@@ -131,7 +131,7 @@ pub fn next_rows<const R: usize>(costs: &[f64], columns: usize, table: &mut [f64
         let whole = columns + 1 - R;
         let costs: [&[f64]; R] = std::array::from_fn(|row| &costs[row * columns + R - 1 - row..][..whole]);
         let mut rows = below.chunks_mut(columns);
-        let mut rows: [&mut [f64]; R] =
+        let rows: [&mut [f64]; R] =
             std::array::from_fn(|row| &mut rows.next().unwrap_or_default()[R - 1 - row..][..whole]);
         for (column, up) in above[R - 1..].iter().enumerate() {
             for row in (0..R).rev() {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +39,7 @@ class Alignment:
     mirrored: bool = False
     notes: tuple[str, ...] = ()
 
-    @property
+    @cached_property
     def cameras(self) -> tuple[PerspectiveCamera, ...]:
         """The F cameras."""
         return tuple(PerspectiveCamera(matrix, self.image_size) for matrix in self.matrices)

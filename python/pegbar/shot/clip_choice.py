@@ -14,8 +14,8 @@ from pegbar.io.motion import read_motion
 from pegbar.scene.clip import Clip
 from pegbar.scene.drawing import Drawing
 from pegbar.scene.motion import Motion
-from pegbar.shot.alignment import View
 from pegbar.shot.model import ClipSection
+from pegbar.shot.registered import View
 
 
 @dataclass(frozen=True, eq=False)

@@ -127,11 +127,11 @@ class AlignSection(Section):
     output: str = "align"
     mode: Literal["auto", "static", "pan", "free"] = "auto"
     root: Literal["auto", "travel", "in_place"] | Annotated[float, Field(ge=0, le=1)] = "auto"
-    field_of_view: float | None = Field(None, gt=0, lt=180)
-    smoothing: float = Field(0.0, ge=0, allow_inf_nan=False)
-    root_smoothing: float = Field(0.25, ge=0, allow_inf_nan=False)
+    field_of_view: float | None = Field(default=None, gt=0, lt=180)
+    smoothing: float = Field(default=0.0, ge=0, allow_inf_nan=False)
+    root_smoothing: float = Field(default=0.25, ge=0, allow_inf_nan=False)
     ground: bool = False
-    floor: float | None = Field(None, allow_inf_nan=False)
+    floor: float | None = Field(default=None, allow_inf_nan=False)
     use: Literal["auto", "always", "never"] = "auto"
 
 
