@@ -16,6 +16,7 @@ from pegbar.lift.given import Given, Refinement
 from pegbar.lift.lengths import Drawn, clip_lengths, likely_lengths
 from pegbar.lift.pins import meet_lengths, planted_targets
 from pegbar.lift.projection import known
+from pegbar.lift.proportions import limb_scales, weighted_median
 from pegbar.lift.rays import fill_marks, mark_noise, metres_per_unit, project, sight_rays, smooth_marks
 from pegbar.lift.rigid import LimbTracks, rigid_limbs
 from pegbar.scene.limb_tree import Link, limb_tree
@@ -48,7 +49,7 @@ class _Figure:
     smooth: tuple[Floats, Floats]
     marked: tuple[Floats, Floats]
     noise: Floats
-    scale: float
+    scales: Floats
 
 
 def refine_markers(given: Given, options: Refinement) -> tuple[Floats, Floats]:
@@ -86,7 +87,7 @@ def _all_lengths(
     if lengths is not None:
         return lengths
     frames = len(figure.points)
-    solved = np.tile(figure.scale * clip_lengths(figure.prior, limbs), (frames, 1))
+    solved = np.tile(np.median(figure.scales) * clip_lengths(figure.prior, limbs), (frames, 1))
     for (_, _, limb), length in zip(links, linked, strict=True):
         if limb >= 0:
             solved[:, limb] = length
@@ -104,13 +105,23 @@ def _start(given: Given, links: list[Link], marked_noise: float | None) -> _Figu
     jolts = np.median(np.abs(np.diff(picture, 2, axis=0)), axis=(0, 2)) + 1e-3 / unit if len(drawn) > 2 else 1.0
     smooth = sight_rays(smooth_marks(filled, noise / unit, np.broadcast_to(jolts, noise.shape[1:])), cameras)
     points = _onto_rays(prior, smooth)
-    scale = _scale(points, prior, smooth[1], ends)
+    scales = np.ones(drawn.shape[1])
+    scales[ends[:, 1]] = limb_scales(points, prior, smooth[1], ends)
     if lengths is not None:
-        whole = [link for link in links if link[2] >= 0]
-        spans = np.linalg.norm([prior[:, a] - prior[:, b] for a, b, _ in whole], axis=-1)
-        told = lengths[:, [limb for _, _, limb in whole]]
-        scale = float(told.sum() / spans.sum()) if spans.sum() > 0 and told.sum() > 0 else scale
-    return _Figure(points, prior, smooth, sight_rays(filled, cameras), noise, scale)
+        scales[ends[:, 1]] = _told_scales(scales[ends[:, 1]], prior, links, lengths)
+    return _Figure(points, prior, smooth, sight_rays(filled, cameras), noise, scales)
+
+
+def _told_scales(scales: Floats, prior: Floats, links: list[Link], lengths: Floats) -> Floats:
+    """The links' scales where lengths are told: theirs, and their median for links without."""
+    spans = np.median([np.linalg.norm(prior[:, a] - prior[:, b], axis=-1) for a, b, _ in links], axis=1)
+    limbs = np.array([limb for _, _, limb in links])
+    told = np.where(limbs >= 0, np.median(lengths, axis=0)[limbs], 0.0)
+    both = (told > NO_LENGTH) & (spans > NO_LENGTH)
+    if not both.any():
+        return scales
+    ratios = told / np.where(both, spans, 1)
+    return np.where(both, ratios, weighted_median(ratios[both], spans[both]))
 
 
 def _onto_rays(points: Floats, rays: tuple[Floats, Floats]) -> Floats:
@@ -120,23 +131,11 @@ def _onto_rays(points: Floats, rays: tuple[Floats, Floats]) -> Floats:
     return nearest
 
 
-def _scale(points: Floats, prior: Floats, directions: Floats, ends: NDArray[np.int64]) -> float:
-    """How much larger the drawn figure is than the clip's, from its limbs across the view."""
-    first, second = ends.T
-    away = directions[:, second]
-
-    def across(markers: Floats) -> float:
-        limbs = markers[:, second] - markers[:, first]
-        return float(np.sum(np.square(limbs - np.sum(limbs * away, axis=-1, keepdims=True) * away)))
-
-    return float(np.sqrt(across(points) / max(across(prior), 1e-12))) or 1.0
-
-
 @dataclass(frozen=True)
 class _Level:
     """Limbs that hang equally far from the root, and what the drawings and the clip say of them.
 
-    ``drawn`` as in `likely_lengths`; ``limbs`` (F, V, 3) and ``spans`` (V,) are the clip's, at the drawing's scale.
+    ``drawn`` as in `likely_lengths`; ``limbs`` (F, V, 3) and ``spans`` (V,) are the clip's, as large as they are drawn.
     """
 
     links: list[Link]
@@ -149,7 +148,7 @@ class _Level:
 
 def _observed(figure: _Figure, links: list[Link]) -> _Level:
     parents, children = np.array([link[:2] for link in links], dtype=np.int64).T
-    limbs = figure.scale * (figure.prior[:, children] - figure.prior[:, parents])
+    limbs = figure.scales[children, None] * (figure.prior[:, children] - figure.prior[:, parents])
     spans = np.median(np.linalg.norm(limbs, axis=-1), axis=0)
     before = _onto_rays(figure.points[:, parents], _of(figure.smooth, parents))
     across = _onto_rays(before, _of(figure.smooth, children)) - before
