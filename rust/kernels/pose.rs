@@ -97,10 +97,13 @@ fn fit_block(poses: &[DVec3], marks: &[[f64; 2]], settings: &Settings, found: &m
         focal_weight: settings.focal_spread.map(f64::recip),
         upright_weight: settings.upright_spread.recip(),
     };
-    let (mut best, mut cost) = minimise(&target, start(&target, 0.0), ROUGH);
+    // Losses that forget outliers forget whole limbs from a rough start: first the one that forgets nothing.
+    let whole = if settings.loss == Loss::Squared { Loss::Squared } else { Loss::Huber };
+    let rough = Target { loss: whole, ..target };
+    let (mut best, mut cost) = minimise(&rough, start(&rough, 0.0), ROUGH);
     for turn in 1..settings.starts {
         let azimuth = std::f64::consts::TAU * turn as f64 / settings.starts as f64;
-        let (camera, reached) = minimise(&target, start(&target, azimuth), ROUGH);
+        let (camera, reached) = minimise(&rough, start(&rough, azimuth), ROUGH);
         let better = reached.below(cost);
         (best, cost) = (camera.or(&better, &best), reached.or(&better, cost));
     }

@@ -53,6 +53,28 @@ def test_exchanged_marks_are_found_and_told_from_a_mirrored_motion():
     assert other.sides == "mirror image of the clip"
 
 
+def test_a_pose_that_is_its_own_mirror_image_is_as_marked():
+    symmetric = (CLIP.markers + mirror(CLIP.markers).astype(np.float32)) / 2
+    clip = Clip("both.bvh", symmetric, 30.0, 120.0, 0, 240)
+    noise = np.random.default_rng(2).normal(0, 1, (1, 16, 2))
+    for frame in (10, 60, 110):
+        found = best(drawn(clip, frame, 1, 0) + noise, clip)
+        assert (found.mirrored, found.swapped) == (False, False)
+
+
+@pytest.mark.parametrize("group", ["arms", "legs"])
+def test_drawings_with_mixed_up_limbs_are_named(group):
+    marks = drawn(CLIP, 40, 30, 20)
+    assert best(marks).mixed == {}
+    joints = ("shoulder", "elbow", "hand") if group == "arms" else ("hip", "knee", "foot")
+    wrong = marks.copy()
+    for joint in joints:
+        left, right = MARKERS.index(f"left_{joint}"), MARKERS.index(f"right_{joint}")
+        wrong[[7, 8, 20], left], wrong[[7, 8, 20], right] = marks[[7, 8, 20], right], marks[[7, 8, 20], left]
+    found = best(wrong)
+    assert {name: frames.tolist() for name, frames in found.mixed.items()} == {group: [7, 8, 20]}
+
+
 def test_a_mirrored_picture_is_told_by_covered_marks_only():
     marks, seen = drawn(CLIP, 40, 30, 60, 10) * [-1, 1], covered(CLIP, 40, 30, 60, 10)
     told = best(marks, visible=seen)

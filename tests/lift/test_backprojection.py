@@ -120,12 +120,19 @@ def test_hidden_markers_are_nan_and_nobody_looks_at_them():
     markers, matrices, depths = shot(9, 8, 2)
     visible = np.ones((8, 2), bool)
     visible[[0, 3, 7], 1] = False
-    want = back_project(np.where(visible[..., None], markers, 5), matrices, depths, smoothing=3.0, visible=visible)
+    ways = [{"smoothing": 0.0}, {"smoothing": 3.0}, {"smoothing": 3.0, "form": "printed"}]
+    wants = [back_project(markers, matrices, depths, visible=visible, **way) for way in ways]
     markers[~visible], depths[~visible] = np.nan, np.inf
-    for smoothing, form in ((0.0, "ray"), (3.0, "ray"), (3.0, "printed")):
-        points = back_project(markers, matrices, depths, smoothing=smoothing, visible=visible, form=form)
+    for way, want in zip(ways, wants, strict=True):
+        points = back_project(markers, matrices, depths, visible=visible, **way)
         np.testing.assert_array_equal(np.isnan(points).any(axis=2), ~visible)
-    np.testing.assert_array_equal(back_project(markers, matrices, depths, smoothing=3.0, visible=visible), want)
+        np.testing.assert_array_equal(points, want)
+    # A frame alone between hidden ones has nothing to be smoothed with.
+    visible[:, 0] = np.arange(8) % 2 == 0
+    for way in ways:
+        points = back_project(markers, matrices, depths, visible=visible, **way)[visible[:, 0], 0]
+        exact = back_project(markers, matrices, depths, visible=visible)[visible[:, 0], 0]
+        np.testing.assert_allclose(points, exact, atol=1e-12)
 
 
 @pytest.mark.parametrize("scale", [-3.0, 0.01])
@@ -143,7 +150,7 @@ def test_the_pixels_origin_does_not_matter(form):
     markers, matrices, depths = shot(11, 5, 2)
     shift = np.array([[1, 0, 5000], [0, 1, -800], [0, 0, 1.0]])
     want = back_project(markers, matrices, depths, smoothing=1.0, form=form)
-    got = back_project(markers + [5000, -800], shift @ np.array(matrices), depths, smoothing=1.0, form=form)
+    got = back_project(np.add(markers, [5000, -800]), shift @ np.array(matrices), depths, smoothing=1.0, form=form)
     np.testing.assert_allclose(got, want, atol=1e-9)
 
 

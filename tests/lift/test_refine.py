@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from pegbar import OrthographicCamera, PerspectiveCamera, _kernels, drawn_lengths, reconstruct_markers
-from pegbar.lift.tree import limb_tree
+from pegbar.scene.limb_tree import limb_tree
 from tests.figures import LENGTHS, LIMBS, spans, swinging
 from tests.oracles import signs as oracle
 

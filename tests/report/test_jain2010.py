@@ -34,7 +34,7 @@ def test_figure_9_comes_out_in_the_papers_order(motions):
 
 
 def test_depth_of_the_walk_itself_is_without_error(motions):
-    same = {clip: motions[TRUTH] for clip in motions}
+    same = dict.fromkeys(motions, motions[TRUTH])
     result = figure9(same, registered=False)
     assert result.mean("three-quarter", "35_01") < 1e-12
 
@@ -67,7 +67,7 @@ def test_what_is_missing_is_named(tmp_path, capsys):
     assert main(["reproduce", "jain2010-fig9", "--data", str(tmp_path)]) == 2
     assert "lacks the CMU clip 35_01 (cmu_35_01.bvh, 35_01.bvh or 35_01.amc)" in capsys.readouterr().err
     assert main(["reproduce", "fig9", "--data", str(tmp_path)]) == 2
-    assert "want jain2010-fig9 or " in capsys.readouterr().err
+    assert "jain2010-fig9 or foot-contact, got fig9" in capsys.readouterr().err
 
 
 def test_clips_are_found_in_folders_bvh_before_amc(tmp_path):

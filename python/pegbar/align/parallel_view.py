@@ -16,6 +16,7 @@ from pegbar import arrays
 from pegbar.align.descriptor import pose_descriptor, pose_distance
 from pegbar.align.timewarp import time_warp
 from pegbar.errors import DegenerateError
+from pegbar.scene.limb_tree import limb_tree
 from pegbar.scene.orthographic import OrthographicCamera
 
 Floats = NDArray[np.float64]
@@ -27,6 +28,8 @@ HIGHEST = 85.0
 STARTS, ROUNDS = 6, 4
 #: More frames than these are thinned out: they tell the direction no better.
 FRAMES = 120
+#: How much a limb's own scale is drawn to the common one; 0 leaves it free.
+OWN = 2.0
 
 
 @dataclass(frozen=True)
@@ -42,8 +45,9 @@ class _View:
 def find_orthographic(drawn: ArrayLike, points: ArrayLike, *, limbs: ArrayLike | None = None) -> OrthographicCamera:
     """Find the orthographic camera under which a clip looks most like the drawings.
 
-    Azimuth, elevation and scale are those of the least squared distance between drawn and projected markers, every
-    frame about its own centre, so that neither the clip's travel nor the drawing's matters.
+    Neither the clip's travel nor the drawing's matters. Azimuth, elevation and scale are those of the least squared
+    distance between drawn and projected markers, every frame about its own centre; with ``limbs``, between drawn and
+    projected limbs, each of which may be drawn longer or shorter than the clip's.
 
     Parameters
     ----------
@@ -82,7 +86,8 @@ def find_orthographic(drawn: ArrayLike, points: ArrayLike, *, limbs: ArrayLike |
     pairs = None if limbs is None else arrays.integers("limbs", limbs, ("K", 2), low=0, high=markers - 1)
     marks, clip = _thinned(marks), _thinned(clip)
     starts = sorted(_grid(marks, clip, pairs))[:STARTS]
-    views = [_refined(marks, clip, pairs, azimuth, elevation) for _, azimuth, elevation in starts]
+    tree = None if pairs is None else np.array([link[:2] for level in limb_tree(pairs, clip, 0) for link in level])
+    views = [_refined(marks, clip, pairs, tree, azimuth, elevation) for _, azimuth, elevation in starts]
     best = min(views, key=lambda view: view.error)
     if not best.scale > 0:
         raise DegenerateError("drawn: the drawings have no extent, or show nothing of the clip's pose")
@@ -99,7 +104,9 @@ def _grid(marks: Floats, clip: Floats, limbs: NDArray[np.int64] | None) -> list[
     """(cost, azimuth, elevation) of every direction of the grid."""
     directions = [(azimuth, elevation) for azimuth in AZIMUTHS for elevation in ELEVATIONS]
     if limbs is None:
-        return [(_fit(marks, clip, azimuth, elevation).error, azimuth, elevation) for azimuth, elevation in directions]
+        return [
+            (_fit(marks, clip, None, azimuth, elevation).error, azimuth, elevation) for azimuth, elevation in directions
+        ]
     costs = []
     for azimuth, elevation in directions:
         camera = OrthographicCamera.from_angles(azimuth, elevation)
@@ -117,41 +124,64 @@ def _aligned(marks: Floats, clip: Floats, limbs: NDArray[np.int64] | None, camer
     return clip if limbs is None else clip[time_warp(_cost(marks, clip, limbs, camera), stiffness=0).frames]
 
 
-def _refined(marks: Floats, clip: Floats, limbs: NDArray[np.int64] | None, azimuth: float, elevation: float) -> _View:
+def _refined(
+    marks: Floats,
+    clip: Floats,
+    limbs: NDArray[np.int64] | None,
+    tree: NDArray[np.int64] | None,
+    azimuth: float,
+    elevation: float,
+) -> _View:
     view = _View(azimuth, elevation, 0.0, np.inf)
     for _ in range(1 if limbs is None else ROUNDS):
         poses = _aligned(marks, clip, limbs, OrthographicCamera.from_angles(view.azimuth, view.elevation))
-        angles = _best_angles(marks, poses, view)
-        fitted = _fit(marks, poses, *angles)
+        fitted = _fit(marks, poses, tree, *_best_angles(marks, poses, tree, view))
         if not fitted.error < view.error - 1e-9:
             break
         view = fitted
     return view
 
 
-def _best_angles(marks: Floats, poses: Floats, start: _View) -> tuple[float, float]:
+def _best_angles(marks: Floats, poses: Floats, limbs: NDArray[np.int64] | None, start: _View) -> tuple[float, float]:
     def residuals(angles: Floats) -> Floats:
-        return _residuals(marks, poses, float(angles[0]), float(angles[1]))[0].ravel()
+        return _residuals(marks, poses, limbs, float(angles[0]), float(angles[1]))[0].ravel()
 
     bounds = ([-np.inf, -HIGHEST], [np.inf, HIGHEST])
     solved = least_squares(residuals, [start.azimuth, start.elevation], bounds=bounds, x_scale=10.0, xtol=1e-7)
     return float(solved.x[0]), float(solved.x[1])
 
 
-def _fit(marks: Floats, poses: Floats, azimuth: float, elevation: float) -> _View:
-    residuals, scale, extent = _residuals(marks, poses, azimuth, elevation)
+def _fit(marks: Floats, poses: Floats, limbs: NDArray[np.int64] | None, azimuth: float, elevation: float) -> _View:
+    residuals, scale, extent = _residuals(marks, poses, limbs, azimuth, elevation)
     error = float(np.sum(residuals**2)) / extent if extent > 0 and scale > 0 else np.inf
     return _View(float(azimuth), float(elevation), scale, error)
 
 
-def _residuals(marks: Floats, poses: Floats, azimuth: float, elevation: float) -> tuple[Floats, float, float]:
-    """Drawn minus projected markers, each frame about its centre; the best scale, and the drawings' squared extent."""
-    seen = np.asarray(np.isfinite(marks).all(axis=-1, keepdims=True))
+def _residuals(
+    marks: Floats, poses: Floats, limbs: NDArray[np.int64] | None, azimuth: float, elevation: float
+) -> tuple[Floats, float, float]:
+    """Drawn minus projected, the best scale, and the drawings' squared extent.
+
+    Compared are markers, each frame about its centre; or limbs, each of which may be drawn longer or shorter than the
+    clip's for the whole sequence.
+    """
     camera = OrthographicCamera.from_angles(azimuth, elevation)
-    drawn, clip = _centred(np.where(seen, marks, 0), seen), _centred(camera.project(poses), seen)
+    drawn, clip = _compared(marks, limbs), _compared(camera.project(poses), limbs)
+    seen = np.asarray(np.isfinite(drawn).all(axis=-1, keepdims=True))
+    drawn, clip = np.where(seen, drawn, 0), clip * seen
+    if limbs is None:
+        drawn, clip = _centred(drawn, seen), _centred(clip, seen)
     size = float(np.sum(clip**2))
     scale = max(float(np.sum(drawn * clip)) / size, 0.0) if size > 0 else 0.0
-    return drawn - scale * clip, scale, float(np.sum(drawn**2))
+    scales = np.full(clip.shape[1], scale)
+    if limbs is not None:
+        own = np.sum(clip**2, axis=(0, 2)) + 1e-12 * size
+        scales = np.maximum((np.sum(drawn * clip, axis=(0, 2)) + OWN * scale * own) / ((1 + OWN) * own), 0)
+    return drawn - scales[:, None] * clip, scale, float(np.sum(drawn**2))
+
+
+def _compared(points: Floats, limbs: NDArray[np.int64] | None) -> Floats:
+    return points if limbs is None else points[:, limbs[:, 1]] - points[:, limbs[:, 0]]
 
 
 def _centred(points: Floats, seen: NDArray[np.bool_]) -> Floats:

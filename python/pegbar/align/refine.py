@@ -24,12 +24,13 @@ _LOWEST, _HIGHEST = -45.0, 60.0
 
 @dataclass(frozen=True, eq=False)
 class Aligned:
-    """A candidate seen from its best side: clip frame of every drawing (F,), angle differences (F, K) in radians."""
+    """A candidate from its best side: clip frame of every drawing (F,), angles and differences (F, K) in radians."""
 
     candidate: Candidate
     azimuth: float
     elevation: float
     times: Floats
+    angles: Floats
     differences: Floats
     cost: float
 
@@ -50,7 +51,7 @@ class Refiner:
             return None
         angles = pose_descriptor(camera.project(interpolate(clip.markers, times)), self.marks.pairs)
         differences = internal(angles - self.marks.angles[candidate.exchanged])
-        return Aligned(candidate, place[0] % 360, place[1], times, differences, cost)
+        return Aligned(candidate, place[0] % 360, place[1], times, angles, differences, cost)
 
     def _order(self, drawings: NDArray[np.intp], candidate: Candidate) -> NDArray[np.intp]:
         return np.roll(drawings, -int(np.searchsorted(drawings, candidate.turn)))

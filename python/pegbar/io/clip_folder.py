@@ -65,6 +65,15 @@ def read_clips(
         Where there is no such folder.
     FileNotFoundError
         For a folder without a clip.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> folder = Path(tempfile.mkdtemp())
+    >>> _ = (folder / "cut.bvh").write_text("HIERARCHY")
+    >>> found = read_clips(folder, use_index=False)
+    >>> found.clips, list(found.broken)
+    ((), ['cut.bvh'])
     """
     root = Path(folder)
     if not root.is_dir():

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from pegbar.io.motion import read_motion
+from pegbar.report.clips import find_clip
 from pegbar.report.jain2009 import (
     MARKERS,
     NOISES,
@@ -24,7 +25,6 @@ from pegbar.report.jain2009 import (
     coordinate_errors,
     table1,
 )
-from pegbar.report.jain2010_figure9 import find_clip
 
 NAME = "jain2009-table1"
 _COLORS = dict(zip(WAYS, ("#1f77b4", "#ff7f0e", "#2ca02c"), strict=True))

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from pegbar.align.match import Match, Matches
 from pegbar.io.clip_folder import ClipFolder
+from pegbar.io.numbers import format_frames
 from pegbar.scene.clip import Clip
 
 _VERDICTS = {"fits": "fits", "doubtful": "doubtful", "no": "does not fit"}
@@ -24,8 +25,8 @@ def describe_match(rank: int, match: Match, clip: Clip) -> tuple[str, ...]:
     )
 
 
-def report_matches(folder: ClipFolder, found: Matches) -> None:
-    """Print the matches, the best first, and a sentence on the best."""
+def report_matches(folder: ClipFolder, found: Matches, drawings: Sequence[int]) -> None:
+    """Print the matches, the best first, and what to say of the best; ``drawings`` are the drawings' numbers."""
     from rich.console import Console
     from rich.table import Table
 
@@ -52,7 +53,7 @@ def report_matches(folder: ClipFolder, found: Matches) -> None:
         table.add_row(str(rank), match.clip, _span(match), seconds, *view, f"{match.cost:.1f}", verdict)
     console = Console(highlight=False) if sys.stdout.isatty() else Console(highlight=False, width=160)
     console.print(table)
-    console.print("\n" + _summary(found), soft_wrap=True)
+    console.print("\n" + _summary(found, drawings), soft_wrap=True)
 
 
 def report_left_out(broken: Mapping[str, str], skipped: Mapping[str, str]) -> None:
@@ -63,7 +64,7 @@ def report_left_out(broken: Mapping[str, str], skipped: Mapping[str, str]) -> No
         print(f"pegbar: warning: {name} is left out: {reason}", file=sys.stderr)
 
 
-def _summary(found: Matches) -> str:
+def _summary(found: Matches, drawings: Sequence[int]) -> str:
     limits = f"up to {found.fits:.1f} degrees fits, up to {found.doubtful:.1f} is doubtful"
     if not found.matches:
         return "Nothing fits: no clip is long enough."
@@ -76,7 +77,11 @@ def _summary(found: Matches) -> str:
     elif best.swapped:
         words.append("Left and right seem to be exchanged in the drawing" + _unsure(best) + ".")
     elif best.mirrored:
-        words.append("The drawing is like the clip's mirror image.")
+        otherwise = "" if best.sides_told else ", or left and right are exchanged in it"
+        words.append(f"The drawing is like the clip's mirror image{otherwise}.")
+    for group, frames in best.mixed.items():
+        numbers = format_frames(drawings[frame] for frame in frames)
+        words.append(f"In drawing {numbers} the {group} seem to be marked on the wrong sides.")
     return " ".join(words)
 
 

@@ -12,6 +12,7 @@ from typing import Any
 from pegbar.errors import FormatError
 from pegbar.io.atomic import complete_file
 
+_READING = {"skeleton", "unit", "up", "frame_rate", "joints"}
 _HEADER = re.compile(r"\s*\[{1,2}\s*([^\]]+?)\s*\]{1,2}\s*(#.*)?$")
 
 
@@ -44,15 +45,20 @@ def write_clip(path: Path, section: Mapping[str, Any]) -> None:
 
 
 def replace_clip(text: str, section: Mapping[str, Any]) -> str:
-    """Return the TOML ``text`` with ``section`` in it: in place of its own, keeping its comments, or at the end."""
+    """Return the TOML ``text`` with ``section`` in it: in place of its own, keeping its comments, or at the end.
+
+    The folder to look in stays; what the old section says of how its clip is read stays where the clip stays.
+    """
     lines = text.splitlines()
     headers = [(number, found[1]) for number, line in enumerate(lines) if (found := _HEADER.match(line))]
     begin = next((number for number, name in headers if name == "clip"), None)
     if begin is None:
         return text.rstrip("\n") + "\n\n" + clip_text(section)
     end = next((number for number, _ in headers if number > begin), len(lines))
-    values = _values(section)
-    body = [line for old in lines[begin + 1 : end] if (line := _renewed(old, values)) is not None]
+    values, kept = _values(section), {"folder"}
+    if tomllib.loads(text)["clip"].get("path") == section["path"]:
+        kept |= _READING
+    body = [line for old in lines[begin + 1 : end] if (line := _renewed(old, values, kept)) is not None]
     while body and not body[-1].strip():
         body.pop()
     body += [f"{key} = {value}" for key, value in values.items()]
@@ -60,10 +66,10 @@ def replace_clip(text: str, section: Mapping[str, Any]) -> str:
     return "\n".join([*lines[: begin + 1], *body, *rest]) + "\n"
 
 
-def _renewed(line: str, values: dict[str, str]) -> str | None:
+def _renewed(line: str, values: dict[str, str], kept: set[str]) -> str | None:
     """A line of the old section: with the new value (taken out of ``values``), as it is, or None for an old key."""
     found = re.match(r"(\s*)([\w-]+)(\s*=\s*)(\"(?:[^\"\\]|\\.)*\"|'[^']*'|[^#]*?)(\s*(?:#.*)?)$", line)
-    if not found:
+    if not found or found[2] in kept:
         return line
     if found[2] not in values:
         return found[1] + found[5].strip() if found[5].strip() else None
