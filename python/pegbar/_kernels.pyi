@@ -14,8 +14,10 @@ __all__ = [
     "grow_labels",
     "has_alpha",
     "ink_alpha",
+    "length_costs",
     "lift_markers",
     "limb_depth",
+    "limb_depths",
     "matte",
     "own_alpha",
     "palette_labels",
@@ -25,6 +27,8 @@ __all__ = [
     "render_passes",
     "resolve_passes",
     "rim_depth",
+    "search_clips",
+    "segment_path",
     "segment_stick_figure",
     "stroke_polyline",
     "time_warp",
@@ -56,6 +60,12 @@ def lift_markers(
     prior: NDArray[np.float64],
     weights: tuple[float, float],
     subspace: tuple[NDArray[np.float64], NDArray[np.float64]],
+) -> NDArray[np.float64]: ...
+def limb_depths(
+    drawn: tuple[_Doubles, _Doubles, _Doubles, _Doubles], lengths: NDArray[np.float64]
+) -> NDArray[np.float64]: ...
+def length_costs(
+    drawn: tuple[_Doubles, _Doubles, _Doubles, _Doubles], candidates: NDArray[np.float64]
 ) -> NDArray[np.float64]: ...
 def segment_stick_figure(
     gray: NDArray[np.uint8], ends: NDArray[np.float64], half_widths: NDArray[np.float64], threshold: int
@@ -108,7 +118,7 @@ def parse_bvh(
     tuple[list[str], list[int], _Doubles, list[int], _Doubles], tuple[list[int], NDArray[np.uint8], float, _Doubles]
 ]: ...
 def forward_kinematics(
-    joints: tuple[list[int], _Doubles, _Doubles, list[int], NDArray[np.uint8]], values: _Doubles, angle: float
+    joints: tuple[list[int], _Doubles, _Doubles, list[int], NDArray[np.uint8]], values: _Doubles, degrees: bool
 ) -> tuple[_Doubles, _Doubles]: ...
 def fit_poses(
     joints: _Doubles,
@@ -119,3 +129,11 @@ def pose_distance(a: _Doubles, b: _Doubles, weights: _Doubles, a_trust: _Doubles
 def time_warp(
     cost: _Doubles, open_begin: bool, open_end: bool, slope_limit: int | None
 ) -> tuple[float, NDArray[np.int64]]: ...
+def search_clips(
+    vectors: _Floats,
+    ranges: NDArray[np.uint64],
+    views: _Floats,
+    drawn: tuple[_Floats, _Floats, NDArray[np.uint32], NDArray[np.uint32]],
+    block: int,
+) -> tuple[_Floats, NDArray[np.uint32]]: ...
+def segment_path(costs: _Doubles, steps: NDArray[np.uint32]) -> tuple[NDArray[np.uint32], float]: ...

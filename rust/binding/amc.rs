@@ -1,8 +1,7 @@
 //! Wrapper of `kernels/amc.rs`.
 
-use crate::arrays::empty;
 use crate::errors::format_error;
-use numpy::{PyArray2, PyArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pegbar_kernels::amc;
 use pyo3::prelude::*;
 
@@ -13,7 +12,6 @@ type Motion<'py> = (Vec<String>, usize, usize, Bound<'py, PyArray2<f64>>);
 pub fn parse_amc<'py>(py: Python<'py>, path: &str, text: &[u8], bones: Vec<(String, usize)>) -> PyResult<Motion<'py>> {
     let clip = py.detach(|| amc::parse(text, &bones)).map_err(|error| format_error(py, path, &error))?;
     let width = bones.iter().map(|(_, count)| count).sum();
-    let values = empty(py, [clip.frames, width])?;
-    values.readwrite().as_slice_mut()?.copy_from_slice(&clip.values);
+    let values = PyArray1::from_vec(py, clip.values).reshape([clip.frames, width])?;
     Ok((clip.keywords, clip.first, clip.step, values))
 }

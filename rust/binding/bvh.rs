@@ -21,8 +21,7 @@ pub fn parse_bvh<'py>(py: Python<'py>, path: &str, text: &[u8]) -> PyResult<(Hie
         Ok(array)
     };
     let codes = PyArray1::from_iter(py, clip.channels.iter().map(|channel| channel.code()));
-    let values = empty(py, [clip.frames, clip.channels.len()])?;
-    values.readwrite().as_slice_mut()?.copy_from_slice(&clip.values);
+    let values = PyArray1::from_vec(py, clip.values).reshape([clip.frames, clip.channels.len()])?;
     let (offsets, end_offsets) = (points(&clip.offsets)?, points(&clip.end_offsets)?);
     Ok((
         (clip.names, clip.parents, offsets, clip.end_parents, end_offsets),

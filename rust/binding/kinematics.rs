@@ -19,7 +19,7 @@ pub fn forward_kinematics<'py>(
     py: Python<'py>,
     joints: Joints<'py>,
     values: PyReadonlyArray2<'py, f64>,
-    angle: f64,
+    degrees: bool,
 ) -> PyResult<Poses<'py>> {
     let (parents, offsets, axes, counts, codes) = &joints;
     let channels: Option<Vec<_>> = slice("channels", codes)?.iter().map(|code| Channel::from_code(*code)).collect();
@@ -27,7 +27,7 @@ pub fn forward_kinematics<'py>(
     let offsets: &[DVec3] = grouped("offsets", offsets)?;
     let axes: &[[f64; 9]] = grouped("axes", axes)?;
     let axes: Vec<_> = axes.iter().map(|rows| DMat3::from_cols_array(rows).transpose()).collect();
-    let skeleton = Skeleton { parents, offsets, axes: &axes, counts, channels: &channels, angle };
+    let skeleton = Skeleton { parents, offsets, axes: &axes, counts, channels: &channels, degrees };
     let (frames, numbers) = (values.shape()[0], slice("values", &values)?);
     let (places, turns) = (empty(py, [frames, parents.len(), 3])?, empty(py, [frames, parents.len(), 3, 3])?);
     let (mut places_out, mut turns_out) = (places.readwrite(), turns.readwrite());

@@ -20,6 +20,7 @@ mod raster;
 mod rim;
 mod search;
 mod segment;
+mod signs;
 mod warp;
 
 use pyo3::prelude::*;
@@ -63,6 +64,8 @@ mod _kernels {
     use crate::search::{search_clips, segment_path};
     #[pymodule_export]
     use crate::segment::segment_stick_figure;
+    #[pymodule_export]
+    use crate::signs::{length_costs, limb_depths};
     #[pymodule_export]
     use crate::warp::time_warp;
 }

@@ -1,6 +1,7 @@
 //! Reads the text of an AMC file, Acclaim's motion: frame by frame a line with its number, then one line a bone.
 //!
-//! Nothing announces how many frames there are, so each frame must be whole and their numbers must run evenly.
+//! Nothing announces how many frames there are, so each frame must be whole and their numbers must run evenly. Where the
+//! last line has no end, a last number with fewer decimals than in the frame before is taken for cut.
 
 use crate::words::{TextError, Words, number, quoted};
 
@@ -47,7 +48,18 @@ pub fn parse(text: &[u8], bones: &[(String, usize)]) -> Result<Amc, TextError> {
         return Err(words.fault("the file ends before its first frame"));
     }
     reader.check_whole().map_err(|problem| words.fault(problem))?;
+    let has_half_an_end = text.ends_with(b"\r") && text.windows(2).any(|pair| pair == b"\r\n");
+    if has_half_an_end || (!text.ends_with(b"\n") && !text.ends_with(b"\r") && reader.decimals < reader.decimals_before)
+    {
+        return Err(words.fault("the file seems to be cut short here; if it is whole, end its last line"));
+    }
     Ok(amc)
+}
+
+/// How many digits stand behind the point of the last number of a line.
+fn decimals(line: &[u8]) -> usize {
+    let end = line.iter().rev().position(|byte| *byte == b'.' || byte.is_ascii_whitespace());
+    end.filter(|length| line[line.len() - length - 1] == b'.').unwrap_or(0)
 }
 
 struct Reader<'a> {
@@ -57,6 +69,11 @@ struct Reader<'a> {
     /// The bone whose line is expected: files keep one order.
     next: usize,
     number: usize,
+    /// Decimals of each bone's last number in the latest line of it.
+    tails: Vec<usize>,
+    /// Decimals at the end of the latest line, and of that bone's line before.
+    decimals: usize,
+    decimals_before: usize,
 }
 
 impl<'a> Reader<'a> {
@@ -68,7 +85,8 @@ impl<'a> Reader<'a> {
             bone
         };
         let bones: Vec<_> = bones.iter().map(place).collect();
-        Reader { seen: vec![true; bones.len()], bones, width, next: 0, number: 0 }
+        let (seen, tails) = (vec![true; bones.len()], vec![0; bones.len()]);
+        Reader { bones, seen, width, next: 0, number: 0, tails, decimals: 0, decimals_before: 0 }
     }
 
     /// Begins a frame with its number.
@@ -118,6 +136,8 @@ impl<'a> Reader<'a> {
         }
         self.seen[index] = true;
         self.next = index + 1;
+        self.decimals = decimals(line);
+        self.decimals_before = std::mem::replace(&mut self.tails[index], self.decimals);
         Ok(())
     }
 
@@ -165,6 +185,16 @@ mod tests {
         ] {
             assert_eq!(read(&text).map_err(|error| error.line), Err(line), "{text}");
         }
+    }
+
+    #[test]
+    fn a_last_number_that_is_shorter_than_usual_is_taken_for_cut() {
+        let start = "1\nroot 1 2\nleg 3.25\n2\nroot 1 2\nleg ";
+        for (end, is_read) in [("3.5\n", true), ("3.25", true), ("3.5", false), ("3", false), ("3.25\r", true)] {
+            assert_eq!(read(&format!("{start}{end}")).is_ok(), is_read, "{end:?}");
+        }
+        let crlf = format!("{start}3.25\r\n").replace('\n', "\r\n").replace("\r\r", "\r");
+        assert!(read(&crlf).is_ok() && read(crlf.trim_end_matches('\n')).is_err());
     }
 
     #[test]

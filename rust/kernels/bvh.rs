@@ -3,7 +3,7 @@
 //! Numbers may be broken over lines as they like, but there must be exactly as many as the header says.
 
 use crate::kinematics::Channel;
-use crate::words::{TextError, Words, quoted};
+use crate::words::{TextError, Words, number, quoted};
 use glam::DVec3;
 
 /// A skeleton of this size in every frame is read from any file, though most of its joints had no channels.
@@ -111,7 +111,7 @@ impl Bvh {
             return Err(words.fault("a second OFFSET for one joint"));
         }
         top.offset = true;
-        let offset = DVec3::new(words.number()?, words.number()?, words.number()?);
+        let offset = DVec3::new(coordinate(words)?, coordinate(words)?, coordinate(words)?);
         let offsets = if top.is_end { &mut self.end_offsets } else { &mut self.offsets };
         if let Some(last) = offsets.get_mut(top.index as usize) {
             *last = offset;
@@ -213,6 +213,15 @@ fn channel(word: &[u8]) -> Option<Channel> {
     is(kind, b"rotation").then_some(Channel::Rotation(axis))
 }
 
+/// A number that a brace may follow without a space.
+fn coordinate(words: &mut Words) -> Result<f64, TextError> {
+    let token = words.token().unwrap_or_default();
+    if token.is_empty() {
+        return Err(unexpected(words, token, "a number"));
+    }
+    number(token).map_err(|problem| words.fault_before(token, problem))
+}
+
 fn is(word: &[u8], wanted: &[u8]) -> bool {
     word.eq_ignore_ascii_case(wanted)
 }
@@ -240,7 +249,7 @@ mod tests {
     use super::*;
 
     const TWO: &str = "HIERARCHY\nROOT a{b {\nOFFSET 0 0 0\nCHANNELS 2 Yposition Zrotation\nJOINT c\n{ OFFSET 1 .5 0\n\
-        CHANNELS 1 xROTATION End Site x\n{\nOFFSET 1 0 0 }}}\nMOTION\nFrames: 2\nFrame Time: .0083333\n1 2\n3 4 5\n6";
+        CHANNELS 1 xROTATION End Site x\n{\nOFFSET 1 0 0}}}\nMOTION\nFrames: 2\nFrame Time: .0083333\n1 2\n3 4 5\n6";
 
     #[test]
     fn a_small_file_is_read() {

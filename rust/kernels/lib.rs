@@ -31,6 +31,7 @@ pub mod search;
 pub mod segment;
 mod settle;
 pub mod shade;
+pub mod signs;
 pub mod surface;
 pub mod warp;
 pub mod words;

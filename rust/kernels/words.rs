@@ -8,12 +8,10 @@ use thiserror::Error;
 /// Larger numbers are no length or angle, and sums of them would overflow.
 const LARGEST: f64 = 1e12;
 /// Powers of ten that a double holds exactly.
-const POWERS: [f64; 23] = [
-    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20,
-    1e21, 1e22,
-];
-/// The first whole number whose successor a double cannot hold.
-const EXACT: u64 = 1 << 53;
+const POWERS: [f64; DIGITS + 1] =
+    [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
+/// So many digits are a whole number that a double holds exactly.
+const DIGITS: usize = 15;
 
 /// A file's text that is not what its format asks for.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -100,6 +98,12 @@ impl<'a> Words<'a> {
     /// The next word as a finite number.
     #[inline]
     pub fn number(&mut self) -> Result<f64, TextError> {
+        if self.peek().is_some()
+            && let Some((value, length)) = plain_number(&self.text[self.place..])
+        {
+            self.place += length;
+            return Ok(value);
+        }
         let Some(word) = self.word() else { return Err(self.fault("the file ends where a number is due")) };
         number(word).map_err(|problem| self.fault_before(word, problem))
     }
@@ -145,39 +149,48 @@ fn line(text: &[u8], place: usize) -> usize {
 /// The word as a number, rounded as `str::parse` does; not finite ones are refused.
 #[inline]
 pub fn number(word: &[u8]) -> Result<f64, String> {
-    let value = match plain_number(word) {
-        Some(value) => value,
-        None => {
-            let parsed = from_utf8(word).ok().and_then(|text| text.parse::<f64>().ok());
-            let comma =
-                if word.contains(&b',') { "; numbers have a decimal point and spaces between them" } else { "" };
-            parsed.ok_or_else(|| format!("want a number, got {}{comma}", quoted(word)))?
-        }
-    };
+    if let Some((value, length)) = plain_number(word)
+        && length == word.len()
+    {
+        return Ok(value);
+    }
+    let parsed = from_utf8(word).ok().and_then(|text| text.parse::<f64>().ok());
+    let comma = if word.contains(&b',') { "; numbers have a decimal point and spaces between them" } else { "" };
+    let value = parsed.ok_or_else(|| format!("want a number, got {}{comma}", quoted(word)))?;
     if value.abs() <= LARGEST { Ok(value) } else { Err(format!("want a number up to 1e12, got {}", quoted(word))) }
 }
 
-/// A number without an exponent whose digits fit a double exactly: one division then rounds it correctly.
+/// The number at the start of a text and its length, when it is no larger than allowed, has no exponent, its digits fit
+/// a double exactly (one division then rounds it correctly) and what follows is white; else None.
 #[inline]
-fn plain_number(word: &[u8]) -> Option<f64> {
-    let digits = word.strip_prefix(b"-").unwrap_or(word);
-    let (mut whole, mut behind, mut point, mut any) = (0u64, 0usize, 0usize, false);
-    if digits.len() > 17 {
-        return None;
-    }
-    for byte in digits {
-        match byte.wrapping_sub(b'0') {
-            digit @ 0..=9 => {
-                whole = whole * 10 + u64::from(digit);
-                behind += point;
-                any = true;
-            }
-            _ if *byte == b'.' && point == 0 => point = 1,
-            _ => return None,
+fn plain_number(text: &[u8]) -> Option<(f64, usize)> {
+    let start = usize::from(text.first() == Some(&b'-'));
+    let (digits, point) = digits(&text[start..], 0, DIGITS)?;
+    let (digits, end, behind) = if text.get(start + point) == Some(&b'.') {
+        let (all, length) = self::digits(&text[start + point + 1..], digits, DIGITS - point)?;
+        (all, start + point + 1 + length, length)
+    } else {
+        (digits, start + point, 0)
+    };
+    let size = digits as f64 / POWERS[behind];
+    let is_plain = point + behind > 0 && size <= LARGEST && text.get(end).is_none_or(|byte| is_white(*byte));
+    is_plain.then_some((if start == 1 { -size } else { size }, end))
+}
+
+/// Reads digits behind those of `value`; None when there are more than `most`.
+#[inline(always)]
+fn digits(text: &[u8], mut value: u64, most: usize) -> Option<(u64, usize)> {
+    for (length, byte) in text.iter().enumerate() {
+        let digit = byte.wrapping_sub(b'0');
+        if digit > 9 {
+            return Some((value, length));
         }
+        if length == most {
+            return None;
+        }
+        value = value * 10 + u64::from(digit);
     }
-    let size = whole as f64 / POWERS[behind];
-    (any && whole <= EXACT).then_some(if digits.len() < word.len() { -size } else { size })
+    Some((value, text.len()))
 }
 
 #[cfg(test)]

@@ -12,14 +12,13 @@ from numpy.typing import NDArray
 from pegbar.align import camera_start
 from pegbar.align.camera_solver import solve, unknowns_of
 from pegbar.align.camera_terms import Cameras, Shot, Terms, reprojection
+from pegbar.align.root_motion import HALF_POWER
 
 Floats = NDArray[np.float64]
-#: A moving average over K frames and a second-difference smoother of weight (K / 2.78)^4 halve the same period's power.
-_HALF_POWER = 2.78
 #: How far the focal length of a shot strays from the usual one: standard deviation of its logarithm.
 _FOCAL_SPREAD = 0.35
 #: Median length of a two-dimensional normal error of standard deviation 1.
-_RAYLEIGH_MEDIAN = 1.1774
+RAYLEIGH_MEDIAN = 1.1774
 #: Beyond so many standard deviations a mark counts linearly.
 _KNEE = 2.5
 #: A drawing is never taken as more exact than this share of the figure's spread.
@@ -30,7 +29,7 @@ _LOOKED_AT, _FOLLOWED = 48, 6
 
 @dataclass(frozen=True)
 class Settings:
-    """What the user set: log focal length in pixels, and whether it is only the usual one; smoothing, weights, floor."""
+    """What the user set: the log focal length in pixels, given or the usual one; smoothing, weights and floor."""
 
     log_focal: float
     solve_focal: bool
@@ -45,6 +44,7 @@ class Fit(NamedTuple):
 
     mode: str
     cameras: Cameras
+    terms: Terms
     distances: Floats
     noise: float
 
@@ -68,7 +68,17 @@ def fit(shot: Shot, mode: str, settings: Settings, others: tuple[Fit, ...] = ())
         terms = replace(terms, focal=prior / _FOCAL_SPREAD, knee=knee)
         found = solve(shot, found.cameras, terms, open_)
     distances = np.linalg.norm(reprojection(shot, found.cameras), axis=-1)
-    return Fit(mode, found.cameras, distances, _noise(shot, found.cameras))
+    return Fit(mode, found.cameras, terms, distances, _noise(shot, found.cameras))
+
+
+def refit(shot: Shot, found: Fit, settings: Settings, without: NDArray[np.intp]) -> Cameras:
+    """Return the cameras of ``found`` solved again without the marks of some frames; smoothness leads through them."""
+    seen = shot.seen.copy()
+    seen[without] = False
+    part = Shot(shot.marks, seen, shot.points, shot.middle)
+    return solve(
+        part, found.cameras, found.terms, unknowns_of(found.mode, settings.solve_focal), steps=15, tolerance=1e-3
+    ).cameras
 
 
 def figure_spread(shot: Shot) -> float:
@@ -86,18 +96,19 @@ def figure_middles(shot: Shot) -> Floats:
 
 def _noise(shot: Shot, cameras: Cameras) -> float:
     distances = np.linalg.norm(reprojection(shot, cameras), axis=-1)
-    return float(np.median(distances[shot.seen])) / _RAYLEIGH_MEDIAN
+    return float(np.median(distances[shot.seen])) / RAYLEIGH_MEDIAN
 
 
 def _terms(shot: Shot, settings: Settings, start: Cameras, spread: float) -> Terms:
     """Return the terms' factors; a metre has the pixels that it has at the figure."""
     weights = settings.weights
     depth = float(np.median(np.linalg.norm(figure_middles(shot) - start.centers, axis=1)))
-    turn = 2 * spread * math.sqrt(weights["smooth"]) * (settings.window / _HALF_POWER) ** 2
+    turn = 1.5 * spread * math.sqrt(weights["smooth"]) * (settings.window / HALF_POWER) ** 2
     return Terms(
         turn=turn,
         place=turn / depth,
         roll=math.sqrt(weights["roll"]) * spread,
+        level=math.sqrt(weights["level"]) * spread,
         ground=0.0 if settings.floor is None else math.sqrt(weights["ground"]) * math.exp(settings.log_focal) / depth,
         floor=settings.floor or 0.0,
         focal=0.0,

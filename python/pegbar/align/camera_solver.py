@@ -34,8 +34,13 @@ def unknowns_of(mode: str, solve_focal: bool) -> Unknowns:
 def solve(
     shot: Shot, start: Cameras, terms: Terms, unknowns: Unknowns, *, steps: int = 50, tolerance: float = 1e-6
 ) -> Solution:
-    """Return the cameras of least cost near ``start``; it ends when a step gains less than ``tolerance`` of it."""
+    """Return the cameras of least cost near ``start``; it ends when a step gains less than ``tolerance`` of it.
+
+    A start that has marks behind the camera is returned as it is, at infinite cost.
+    """
     cameras, best = start, cost(shot, start, terms)
+    if best == np.inf:
+        return Solution(start, best, 0)
     damping, tried = 1e-3, 0
     equations: Normal | None = None
     while tried < steps and damping < _MOST_DAMPING:

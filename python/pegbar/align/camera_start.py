@@ -22,6 +22,9 @@ ELEVATIONS = np.arange(-45.0, 76.0, 15.0)
 #: A turn of so many degrees from one looked-at frame to the next costs as much as the usual frame fits badly.
 _USUAL_TURN = 20.0
 
+#: A camera starts so many metres away at least.
+_NEAREST = 0.5
+
 
 class Views(NamedTuple):
     """How well G rotations explain n frames.
@@ -106,11 +109,17 @@ def still_starts(shot: Shot, found: Views, log_focal: float, count: int) -> list
 
 
 def still(shot: Shot, rotations: Floats, log_focal: float) -> Cameras:
-    """Return cameras with these ``rotations`` (F, 3, 3) and the one centre from which the marks' rays fit best."""
+    """Return cameras with these ``rotations`` (F, 3, 3) and the one centre from which the marks' rays fit best.
+
+    Where that is too near, the centre goes back until the whole figure is in front in every frame.
+    """
     image = (shot.marks - shot.middle) / np.exp(log_focal)
     rows = (image[..., None] * rotations[:, None, 2:, :] - rotations[:, None, :2, :]) * shot.seen[..., None, None]
     offset = np.einsum("fnac,fnc->fna", rows, shot.points)
     center = np.linalg.lstsq(rows.reshape(-1, 3), offset.ravel(), rcond=None)[0]
+    depth = np.einsum("fc,fnc->fn", rotations[:, 2], shot.points - center)[shot.seen]
+    ahead = rotations[:, 2].mean(axis=0)
+    center = center - ahead / np.linalg.norm(ahead) * max(0.0, _NEAREST - float(depth.min()))
     return Cameras(np.array(rotations), np.broadcast_to(center, (len(rotations), 3)).copy(), log_focal)
 
 

@@ -17,9 +17,10 @@ class CameraTrack:
 
     ``matrices`` (F, 3, 4) float map world metres to pixels, depth in the third row; ``errors`` (F,) float are the
     frames' RMS distances in pixels between projected and drawn marks that are seen (NaN where none is). ``mode`` and
-    ``root`` are what was chosen, ``points`` (F, N, 3) float the points that the cameras see (the clip's, without its
-    travel where ``root`` is "in_place"), ``noise`` the usual distance of a mark, robustly, in pixels. ``trials`` holds
-    for every mode that was tried the RMS distance over the shot, ``notes`` what a user should know.
+    ``root`` ("travel", "in_place" or "scaled") are what was chosen, ``travel`` the share of the clip's travel that is
+    kept, ``points`` (F, N, 3) float the points that the cameras see: the clip's with that travel. ``noise`` is the
+    marks' robust standard deviation in pixels; ``trials`` holds, where the mode was chosen, the RMS distance of every
+    mode in frames held out; ``notes`` are what a user should know.
     """
 
     matrices: NDArray[np.float64]
@@ -27,6 +28,7 @@ class CameraTrack:
     image_size: tuple[int, int]
     mode: str
     root: str
+    travel: float
     points: NDArray[np.float64]
     noise: float
     trials: dict[str, float] = field(default_factory=dict)

@@ -41,6 +41,21 @@ def smooth_curve(values: Floats, period: float) -> Floats:
     return np.asarray(flat, np.float64).reshape(values.shape)
 
 
+def smooth_weighted(target: Floats, weights: Floats, spacing: Floats, stiffness: float) -> Floats:
+    """Return the times (F,), never decreasing, near ``target`` where its ``weights`` (F,) are large, and smooth.
+
+    They minimise the weighted squared distance (a usual weight counts 1) plus ``stiffness`` times the squared changes
+    of speed; ``spacing`` (F - 1,) are the durations between the entries.
+    """
+    if len(target) < 3:
+        return target
+    shares = np.clip(weights / max(float(np.median(weights)), 1e-12), 0.05, 5.0)
+    bands = stiffness * _bending(spacing)
+    bands[0] += shares
+    times: Floats = np.maximum.accumulate(solveh_banded(bands, shares * target, lower=True, check_finite=False))
+    return times
+
+
 def _bending(spacing: Floats) -> Floats:
     """Lower bands (3, F) of the matrix of the sum of squared accelerations over a time in units of the mean spacing."""
     count = len(spacing) + 1

@@ -52,12 +52,36 @@ Reads the joint marks and every BVH, AMC and C3D file in a folder and the folder
 a table, and says so when nothing fits. Left and right mixed up in the drawing, and mirrored motions, are found too.
 
 Example: pegbar match my_shot/annotation.json mocap -o my_shot/match --write my_shot/shot.toml""",
+    "align": """Find the camera of every drawing, and put the drawn joints into 3D.
+
+Retimes the clip of the shot's [clip] section to the drawings (or finds one in its folder), registers cameras, and
+back-projects the marks. Writes overlays to look at, a warp plot, errors, and marks with cameras and depths, which
+pegbar depth and composite then use.
+
+Example: pegbar align my_shot/shot.toml""",
+    "lift": """Make a 3D animation of a drawn sequence, with the artist's poses and timing.
+
+Aligns the shot first where that is out of date. Writes the clip's skeleton posed as drawn (BVH, glTF, USD), the 3D
+markers (CSV, npz), a sheet to look at and a report.
+
+Example: pegbar lift my_shot/shot.toml""",
     "motion": """Look at motion capture clips.""",
     "demo": """Make a sample shot from nothing and run every stage on it.
 
 A drawn dancer with a hoop and a ribbon.
 
 Example: pegbar demo demo""",
+    "reproduce": """Repeat an experiment of the papers on clips that you have.
+
+jain2009-table1: a walk drawn by a known camera and lifted to 3D with another walk.
+
+jain2010-fig9: how wrong a walk's depth is when it comes from other clips.
+
+foot-contact: how much better feet and knees are placed when standing feet take their depth from the floor.
+
+Tables are printed and written as CSV, plots as PNG.
+
+Example: pegbar reproduce jain2010-fig9 --data clips -o reproduced""",
 }
 #: Commands that are groups of commands: these are in the group's module.
 GROUPS = {

@@ -29,7 +29,9 @@ class ClipOptions:
 
     skeleton: Annotated[Path | None, Parameter(help="The .asf file of an .amc (default: the one beside it).")] = None
     unit: Annotated[str | None, Parameter(help="Metres in the file's unit, or m, cm, mm, inch, foot, cmu.")] = None
-    up: Annotated[str | None, Parameter(help="The file's up axis: x, y, z, -x, -y or -z.")] = None
+    up: Annotated[
+        str | None, Parameter(help="The file's up axis: x, y, z, -x, -y or -z.", allow_leading_hyphen=True)
+    ] = None
     frame_rate: Annotated[float | None, Parameter(help="Frames a second.")] = None
     joint_map: Annotated[Path | None, Parameter(help="Joints that are to be other than found (TOML).")] = None
 
@@ -134,7 +136,7 @@ def _print_table(clips: list[tuple[Path, Motion, ClipReport]]) -> None:
 def _row(path: Path, motion: Motion, report: ClipReport) -> tuple[str, ...]:
     count = len(motion.positions)
     name = report.unit_from.rpartition(": ")[2] if ":" in report.unit_from else ""
-    faces = "-" if report.facing is None else " to ".join(dict.fromkeys(f"{angle:.0f}" for angle in report.facing))
+    faces = "-" if report.facing is None else " to ".join(dict.fromkeys(str(round(angle)) for angle in report.facing))
     found = len(MARKERS) - len(report.missing)
     return (
         path.name,

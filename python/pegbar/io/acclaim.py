@@ -80,13 +80,14 @@ def _record(path: _Path, text: bytes, skeleton: Skeleton, notes: tuple[str, ...]
     keywords, first, step, values = _kernels.parse_amc(os.fspath(path), text, numbers)
     names, parents, offsets, axes = _joints(skeleton, bones)
     if len(values) * len(names) > len(text) + _JOINTS_OF_SMALL_FILE:
-        raise FormatError(path, f"{len(values)} frames of {len(names)} joints, most of which never move")
+        raise FormatError(path, f"{len(values)} frames of {len(names)} joints, most of which never move", line=1)
     degrees = skeleton.degrees if not {":degrees", ":radians"} & set(keywords) else ":degrees" in keywords
-    angle = math.pi / 180 if degrees else 1.0
-    counts, codes, table = _channels(skeleton, bones, names, values, angle)
-    positions, rotations = _kernels.forward_kinematics((parents, offsets, axes, counts, codes), table, angle)
+    counts, codes, table = _channels(skeleton, bones, names, values, degrees)
+    positions, rotations = _kernels.forward_kinematics((parents, offsets, axes, counts, codes), table, degrees)
     if (first, step) != (1, 1):
         notes += (f"its frames are numbered from {first} in steps of {step}",)
+    if not text.endswith((b"\n", b"\r")):
+        notes += ("its last line has no end: if it was cut short there, frames are missing",)
     return Recording(
         path=path,
         names=tuple(names),
@@ -138,7 +139,7 @@ def _tip(name: str, skeleton: Skeleton) -> str:
 
 
 def _channels(
-    skeleton: Skeleton, bones: list[Bone], names: list[str], values: Floats, angle: float
+    skeleton: Skeleton, bones: list[Bone], names: list[str], values: Floats, degrees: bool
 ) -> tuple[list[int], NDArray[np.uint8], Floats]:
     """How many channels each joint has, their codes, and the numbers (F, C) in that order.
 
@@ -154,7 +155,8 @@ def _channels(
             columns[column] = columns[column] + skeleton.position[code]
     for axis, turn in reversed(skeleton.orientation.items()):
         codes.append(3 + "xyz".index(axis))
-        columns.append(np.full(len(values), math.radians(turn) / angle if skeleton.degrees else turn / angle))
+        radians = math.radians(turn) if skeleton.degrees else turn
+        columns.append(np.full(len(values), math.degrees(radians) if degrees else radians))
     counts, start, turns = [len(codes)], width, {bone.name: bone.turns for bone in bones}
     for name in names[1:]:
         own = turns.get(name, ())

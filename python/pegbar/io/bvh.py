@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Mapping
 
 import numpy as np
@@ -11,11 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from pegbar import arrays
 from pegbar.io import atomic
+from pegbar.scene.conventions import UNITS
 from pegbar.scene.motion import Motion
 
 Floats = NDArray[np.float64]
-#: Metres in a unit of the file.
-UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254}
 
 
 def write_bvh(
@@ -37,7 +37,7 @@ def write_bvh(
         The file to make or replace.
     motion : Motion
         One skeleton: exactly one joint has the parent -1.
-    unit : float or {"cm", "m", "mm", "inch"}
+    unit : float or {"cm", "m", "mm", "inch", "foot", "cmu"}
         The unit of lengths in the file, by name or in metres.
     stretch : bool
         Joints whose offset changes by more than a tenth of a millimetre get position channels too, so that squash and
@@ -55,7 +55,7 @@ def write_bvh(
     """
     scale = _scale(unit)
     order = _depth_first(motion)
-    names = [name.replace(" ", "_") for name in motion.names]
+    names = [re.sub(r"[\s{}]", "_", name) or "_" for name in motion.names]
     if len(set(names)) < len(names):
         raise ValueError("motion: two joints have the same name")
     if not 0 < motion.frame_rate < math.inf:
@@ -96,11 +96,14 @@ def _depth_first(motion: Motion) -> list[int]:
     roots = [joint for joint in range(count) if parents[joint] < 0]
     if len(roots) != 1:
         raise ValueError(f"motion: want one joint without a parent, got {len(roots)}")
+    children: dict[int, list[int]] = {}
+    for joint in range(count - 1, -1, -1):
+        children.setdefault(parents[joint], []).append(joint)
     order, waiting = [], roots
     while waiting:
         joint = waiting.pop()
         order.append(joint)
-        waiting += [child for child in range(count - 1, -1, -1) if parents[child] == joint]
+        waiting += children.get(joint, [])
     if len(order) < count:
         raise ValueError("motion: its parents run in a circle")
     return order
@@ -138,26 +141,31 @@ def _euler_zxy(rotations: Floats) -> Floats:
 def _hierarchy(
     motion: Motion, names: list[str], base: Floats, moving: NDArray[np.bool_], ends: Mapping[str, Floats]
 ) -> str:
+    children: list[list[int]] = [[] for _ in names]
+    for child, parent in enumerate(motion.parents):
+        if parent >= 0:
+            children[parent].append(child)
     lines: list[str] = []
 
-    def offset(value: Floats, depth: int) -> None:
-        lines.append("\t" * depth + "OFFSET " + " ".join(f"{number:.6f}" for number in value.tolist()))
+    def begin(title: str, offset: Floats, depth: int) -> None:
+        tabs = "\t" * depth
+        lines.extend((f"{tabs}{title}", tabs + "{"))
+        lines.append(f"{tabs}\tOFFSET " + " ".join(f"{number:.6f}" for number in offset.tolist()))
 
-    def joint(index: int, depth: int) -> None:
-        lines.append("\t" * depth + f"{'JOINT' if depth else 'ROOT'} {names[index]}")
-        lines.append("\t" * depth + "{")
-        offset(base[index], depth + 1)
-        places = "6 Xposition Yposition Zposition" if moving[index] else "3"
-        lines.append("\t" * (depth + 1) + f"CHANNELS {places} Zrotation Xrotation Yrotation")
-        children = [child for child, parent in enumerate(motion.parents) if parent == index]
-        for child in children:
-            joint(child, depth + 1)
-        if not children:
-            lines.append("\t" * (depth + 1) + "End Site")
-            lines.append("\t" * (depth + 1) + "{")
-            offset(ends.get(motion.names[index], base[index] / 2), depth + 2)
-            lines.append("\t" * (depth + 1) + "}")
-        lines.append("\t" * depth + "}")
-
-    joint(motion.parents.index(-1), 0)
+    # A joint waits once to be begun and once, as its complement, to be ended.
+    waiting, depth = [motion.parents.index(-1)], 0
+    while waiting:
+        joint = waiting.pop()
+        if joint < 0:
+            depth -= 1
+            lines.append("\t" * depth + "}")
+            continue
+        begin(f"{'JOINT' if depth else 'ROOT'} {names[joint]}", base[joint], depth)
+        depth += 1
+        places = "6 Xposition Yposition Zposition" if moving[joint] else "3"
+        lines.append("\t" * depth + f"CHANNELS {places} Zrotation Xrotation Yrotation")
+        if not children[joint]:
+            begin("End Site", ends.get(motion.names[joint], base[joint] / 2), depth)
+            lines.append("\t" * depth + "}")
+        waiting += [~joint, *reversed(children[joint])]
     return "\n".join(lines) + "\n"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 
 import numpy as np
@@ -39,7 +38,7 @@ def read_bvh(path: str | os.PathLike[str]) -> Recording:
     hierarchy, (counts, channels, frame_time, values) = _kernels.parse_bvh(os.fspath(path), read_bytes(path))
     raw_names, parents, offsets, end_parents, end_offsets = hierarchy
     joints = (parents, offsets, np.empty((0, 3, 3)), counts, channels)
-    positions, rotations = _kernels.forward_kinematics(joints, values, math.pi / 180)
+    positions, rotations = _kernels.forward_kinematics(joints, values, True)
     names, notes = unique(raw_names)
     return Recording(
         path=path,

@@ -105,7 +105,8 @@ def _positions(path: _Path, data: bytes, header: Header) -> NDArray[np.float64]:
     stored: NDArray[Any] = raw.view(np.dtype(kind).newbyteorder(header.order)).reshape(header.frames, -1, 4)
     if not header.scale:
         stored = dec_floats(stored) if header.is_dec else stored.view(np.dtype("f4").newbyteorder(header.order))
-    points: NDArray[np.float64] = stored[..., :3].astype(np.float64)
+    with np.errstate(invalid="ignore"):  # a signalling NaN is a missing point like any other
+        points: NDArray[np.float64] = stored[..., :3].astype(np.float64)
     wrong = np.abs(points) > _FARTHEST
     if wrong.any():
         frame, point, _ = (int(index) for index in np.argwhere(wrong)[0])

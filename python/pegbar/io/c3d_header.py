@@ -79,7 +79,8 @@ def read_header(path: _Path, data: bytes) -> Header:
 def dec_floats(words: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
     """DEC's F floats, read as little-endian uint32, as float32: their halves stand swapped, their exponent 2 higher."""
     swapped = (words << np.uint32(16)) | (words >> np.uint32(16))
-    floats: np.ndarray[Any, Any] = swapped.astype("<u4").view("<f4") * np.float32(0.25)
+    with np.errstate(invalid="ignore", over="ignore"):
+        floats: np.ndarray[Any, Any] = swapped.astype("<u4").view("<f4") * np.float32(0.25)
     return np.where(swapped & np.uint32(0x7F800000), floats, np.float32(0))
 
 
@@ -189,7 +190,7 @@ def _frames(path: _Path, parameters: Parameters, first: int, last: int) -> int:
     most = max(said.values())
     for who, count in said.items():
         # In a longer clip a count of 16 bits is cut off or stands at its limit.
-        is_short = most > 0x7FFF and ((most - count) % 0x10000 == 0 or count in (0x7FFF, 0xFFFF))
+        is_short = most > 0x7FFF and ((most - count) % 0x10000 == 0 or count & 0xFFFF in (0x7FFF, 0xFFFF))
         if count != most and not is_short and (who, last) != ("the header", 0xFFFF):
             listed = ", ".join(f"{name} {number}" for name, number in said.items())
             raise FormatError(path, f"the counts of frames disagree: {listed}", byte=6)

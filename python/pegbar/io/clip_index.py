@@ -1,8 +1,8 @@
 """The index of a folder of clips: one file with the markers of all of them.
 
-A line that says what it is, the length of the header and the hash of all that follows; the header in JSON: of every clip its
-files, rates and number of frames; then the markers as float32, clip after clip. An index that is broken, cut short, or
-written by another version is as good as none.
+A line that says what it is, the length of the header and the hash of all that follows; the header in JSON: of every
+clip its files, rates and number of frames; then the markers as float32, clip after clip. An index that is broken, cut
+short, or written by another version is as good as none.
 """
 
 from __future__ import annotations

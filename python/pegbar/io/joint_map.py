@@ -54,7 +54,9 @@ def write_joint_map(
             lines.append(f"# {marker} is the middle of several points")
         elif marker in joint_map:
             key = marker if re.fullmatch(r"[\w-]+", marker, re.ASCII) else json.dumps(marker)
-            lines.append(f"{key} = {json.dumps(joint_map[marker], ensure_ascii=False)}")
+            # TOML's strings are JSON's, but for the character DEL.
+            text = json.dumps(joint_map[marker], ensure_ascii=False).replace("\x7f", "\\u007f")
+            lines.append(f"{key} = {text}")
         elif marker in MARKERS:
             lines.append(f'# {marker} = ""')
     atomic.write_bytes(path, (_HEAD + "\n".join(lines) + "\n").encode())
@@ -91,7 +93,8 @@ def read_joint_map(path: str | os.PathLike[str], names: Collection[str] | None =
         raise FormatError(path, "not UTF-8 text", byte=error.start) from None
     except tomllib.TOMLDecodeError as error:
         place = re.search(r"at line (\d+)", str(error))
-        raise FormatError(path, f"not TOML: {error}", line=int(place[1]) if place else None) from None
+        line = int(place[1]) if place else len(text.splitlines())
+        raise FormatError(path, f"not TOML: {error}", line=line) from None
     for marker, joint in table.items():
         problem = wrong_entry(marker, joint, names)
         if problem:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,6 +93,7 @@ def read_motion(
     """
     metres = _unit(unit)
     if up is not None:
+        up = up.lower()
         up_rotation(up)
     if frame_rate is not None and not 0 < frame_rate < math.inf:
         raise ValueError(f"frame_rate: want frames a second above 0, got {frame_rate}")
@@ -109,7 +109,7 @@ def read_motion(
     height = None if clip.height is None else clip.height * unit_metres
     motion = clip.motion(unit_metres, axis, rate)
     report = ClipReport(unit_metres, unit_from, axis, axis_from, rate_from, height, notes=(*recording.notes, *notes))
-    return replace(motion, report=examine(motion, report))
+    return motion.changed(report=examine(motion, report))
 
 
 def _unit(unit: float | str | None) -> float | None:
@@ -147,7 +147,7 @@ class _Clip:
             self.joint_map = self._map(recording.positions[len(recording.positions) // 2])
         self.frames = self._at(recording.positions) | self.optical
         chain = self._at(self.rest) if self.standing and self.rest is not None else self.frames
-        self.height = person_height(chain, self._skull(chain))
+        self.height = person_height(chain, self._skull(chain), head=0.94 if self.optical else 0.88)
 
     def _map(self, rest: Floats | None) -> dict[str, str]:
         found = map_joints(self.recording.names, self.recording.parents, rest=rest) | dict(self.given)
@@ -211,7 +211,8 @@ class _Clip:
         """The motion in metres, Y up."""
         recording = self.recording
         turn = up_rotation(up, laboratory=self.rest is None)
-        rotations = recording.rotations if up == "y" else turn @ recording.rotations @ turn.T
+        # Points have no axes to turn.
+        rotations = recording.rotations if up == "y" or self.rest is None else turn @ recording.rotations @ turn.T
         positions = (recording.positions * unit) @ turn.T
         rest = None if self.rest is None else self.rest * unit @ turn.T
         ends = {
@@ -220,11 +221,11 @@ class _Clip:
         }
         motion = Motion(
             recording.names, recording.parents, positions, rotations, rate, None, dict(self.given), rest, ends
-        )
+        ).knowing(self.joint_map)
         if self.rest is None:
             return motion
         at = {marker: positions[:, recording.names.index(joint)] for marker, joint in self.joint_map.items()}
-        return replace(motion, rest_frame=inserted_pose(at, positions, rotations))
+        return motion.changed(rest_frame=inserted_pose(at, positions, rotations))
 
 
 def _rest_positions(recording: Recording) -> Floats | None:

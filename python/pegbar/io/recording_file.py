@@ -58,5 +58,5 @@ def _kind(path: _Path, data: bytes) -> str:
     if b":FULLY-SPECIFIED" in head:
         return ".amc"
     if b":BONEDATA" in head:
-        raise FormatError(path, "a skeleton without motion; read its .amc file")
-    raise FormatError(path, "neither its name nor its content is a motion file's: want .bvh, .amc or .c3d")
+        raise FormatError(path, "a skeleton without motion; read its .amc file", line=1)
+    raise FormatError(path, "neither its name nor its content is a motion file's: want .bvh, .amc or .c3d", byte=0)

@@ -14,7 +14,6 @@ from pegbar.scene.motion import Motion
 Floats = NDArray[np.float64]
 
 _LEFT, _RIGHT, _MIDDLE, _FLOOR = "#1f6fd0", "#d03a2b", "#333333", "#8a6d3b"
-_SIDES = ("left", "right")
 #: Stick figure: chains of markers; a chain with a side is drawn once for each.
 _TRUNK = ("pelvis", "chest", "neck", "head")
 _CHAINS = (("neck", "{}_shoulder", "{}_elbow", "{}_hand"), ("pelvis", "{}_hip", "{}_knee", "{}_foot", "{}_toe"))
@@ -87,10 +86,11 @@ def _draw(panel: Any, points: dict[str, Floats], frames: Sequence[int]) -> None:
     if "pelvis" in points:
         panel.plot(*points["pelvis"].T, color=_MIDDLE, linewidth=0.6, linestyle=":", zorder=1)
     for order, frame in enumerate(frames):
-        fade = 1.0 if len(frames) == 1 else 0.2 + 0.8 * order / (len(frames) - 1)
+        fade = 1.0 - 0.8 * (len(frames) - 1 - order) / max(1, len(frames) - 1)
         style = {"alpha": fade, "linewidth": 1.8, "solid_capstyle": "round", "zorder": 2 + order}
         _chain(panel, points, frame, _TRUNK, _MIDDLE, style)
-        for side, color in zip(_SIDES, (_LEFT, _RIGHT), strict=True):
+        # The left, which is nearer in the view from the left, over the right.
+        for side, color in (("right", _RIGHT), ("left", _LEFT)):
             for chain in _CHAINS:
                 _chain(panel, points, frame, [word.format(side) for word in chain], color, style)
         if "head" in points:

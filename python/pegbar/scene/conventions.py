@@ -74,11 +74,12 @@ def is_standing(markers: Markers) -> bool:
     return _angle(hips - knees, knees - feet) < 40 and _angle(top - hips, hips - feet) < 40
 
 
-def person_height(markers: Markers, top: Floats | None = None) -> float | None:
+def person_height(markers: Markers, top: Floats | None = None, *, head: float = 0.88) -> float | None:
     """Return the height of the person standing straight, from the chain ankle, knee, hip, neck, head.
 
     Medians over frames of the bones' lengths, so that no frame needs to stand straight. ``top`` (..., 3) is the top of
-    the skull where it is known. An ankle is at 4 % of a person's height and the head's joint at 88 % (Winter 2009).
+    the skull where it is known. An ankle is at 4 % of a person's height and the head's joint at 88 % (Winter 2009), or
+    where ``head`` says: the middle of markers round the forehead is at 94 %.
     """
     legs = [
         _length(markers[f"{side}_foot"], markers[f"{side}_knee"])
@@ -93,7 +94,7 @@ def person_height(markers: Markers, top: Floats | None = None) -> float | None:
     chain = sum(legs) / len(legs) + sum(_length(low, high) for low, high in pairwise(trunk))
     skull = 0.0 if top is None else _length(markers["head"], top)
     # A tip on the head's joint or far away is a helper, not a skull.
-    height = (chain + skull) / 0.96 if 0.04 * chain < skull < 0.3 * chain else chain / 0.84
+    height = (chain + skull) / 0.96 if 0.04 * chain < skull < 0.3 * chain else chain / (head - 0.04)
     return height if math.isfinite(height) and height > 0 else None
 
 

@@ -7,6 +7,7 @@ import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,15 +125,21 @@ class Motion:
         if step < 1:
             raise ValueError(f"step: want 1 or more, got {step}")
         kept = list(range(len(self.positions))[start:stop:step])
-        part = dataclasses.replace(
-            self,
+        return self.changed(
             positions=self.positions[start:stop:step],
             rotations=self.rotations[start:stop:step],
             frame_rate=self.frame_rate / step,
             rest_frame=next((place for place, frame in enumerate(kept) if frame == self.rest_frame), None),
         )
-        part.__dict__["joint_map"] = self.joint_map
-        return part
+
+    def changed(self, **fields: Any) -> Motion:
+        """Return the motion with other ``fields`` and the same `joint_map`."""
+        return dataclasses.replace(self, **fields).knowing(self.joint_map)
+
+    def knowing(self, joint_map: Mapping[str, str]) -> Motion:
+        """Return this motion, whose ``joint_map`` is known already and need not be found."""
+        self.__dict__["joint_map"] = joint_map
+        return self
 
     def _marker(self, name: str, centres: bool) -> Floats:
         if name in self.names:

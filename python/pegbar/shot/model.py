@@ -92,21 +92,68 @@ class PassesSection(Section):
 
 
 class ClipSection(Section):
-    """``[clip]``: the motion clip that the drawing is like, as `pegbar match` finds it."""
+    """``[clip]``: the motion clip that the drawing is like, as `pegbar match` finds it, or where to look for one."""
 
-    path: str
+    path: str | None = None
+    folder: str | None = None
     start: int = Field(0, ge=0)
     stop: int | None = Field(None, ge=1)
     azimuth: float | None = Field(None, ge=-360, le=360)
     elevation: float | None = Field(None, ge=-90, le=90)
     mirrored: bool = False
     swapped: bool = False
+    skeleton: str | None = None
+    unit: str | Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
+    up: Literal["x", "y", "z", "-x", "-y", "-z"] | None = None
+    frame_rate: float | None = Field(None, gt=0, allow_inf_nan=False)
+    joints: str | None = None
 
     @model_validator(mode="after")
     def _stops_after_its_start(self) -> ClipSection:
         if self.stop is not None and self.stop <= self.start:
             raise ValueError(f"stop: want a frame after start, got {self.stop} after {self.start}")
         return self
+
+    @model_validator(mode="after")
+    def _names_something(self) -> ClipSection:
+        if self.path is None and self.folder is None:
+            raise ValueError("want a path, or a folder to look in")
+        return self
+
+
+class AlignSection(Section):
+    """``[align]``: how the camera is found and the drawing's joints are put into 3D."""
+
+    output: str = "align"
+    mode: Literal["auto", "static", "pan", "free"] = "auto"
+    root: Literal["auto", "travel", "in_place"] | Annotated[float, Field(ge=0, le=1)] = "auto"
+    field_of_view: float | None = Field(default=None, gt=0, lt=180)
+    smoothing: float = Field(default=0.0, ge=0, allow_inf_nan=False)
+    root_smoothing: float = Field(default=0.25, ge=0, allow_inf_nan=False)
+    ground: bool = False
+    floor: float | None = Field(default=None, allow_inf_nan=False)
+    use: Literal["auto", "always", "never"] = "auto"
+
+
+class FlipEntry(Section):
+    """A limb whose depth is turned the other way by hand: the joint at its outer end, and for which drawings."""
+
+    joint: str
+    drawings: str
+
+
+class LiftSection(Section):
+    """``[lift]``: how the drawing becomes a 3D animation, and what is written."""
+
+    output: str = "lift"
+    depth: Literal["clip", "lengths"] = "clip"
+    stretch: bool = False
+    planted: bool = True
+    frame_rate: float | None = Field(default=None, gt=0, allow_inf_nan=False)
+    interpolation: Literal["step", "linear"] = "step"
+    loop: bool = False
+    formats: list[Literal["bvh", "glb", "usd", "csv", "npz"]] = ["bvh", "glb", "csv", "npz"]
+    flips: list[FlipEntry] = []
 
 
 class OutputSection(Section):
@@ -143,6 +190,8 @@ class ShotFile(Section):
     shot: ShotSection = Field(default_factory=ShotSection)
     drawing: DrawingSection
     clip: ClipSection | None = None
+    align: AlignSection = AlignSection()
+    lift: LiftSection = LiftSection()
     camera: CameraSection | None = None
     passes: PassesSection | None = None
     output: OutputSection = Field(default_factory=OutputSection)

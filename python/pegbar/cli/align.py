@@ -1,0 +1,55 @@
+"""`pegbar align`: cameras, and the drawing's joints in 3D."""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from cyclopts import Parameter
+
+from pegbar.cli.batch import progress
+from pegbar.scene.alignment import Alignment
+from pegbar.shot.align_stage import AlignStage
+from pegbar.shot.plan import open_shot
+
+
+def align(
+    shot: Path,
+    *,
+    overwrite: Annotated[bool, Parameter(negative="", help="Align again what is up to date.")] = False,
+) -> int:
+    """Align a shot's drawing with its clip; see `pegbar align --help`.
+
+    Parameters
+    ----------
+    shot
+        The shot file.
+    """
+    stage = AlignStage(open_shot(shot, aligned=False), overwrite)
+    with progress("align", len(stage.numbers)) as advance:
+        alignment, made = stage.run(lambda _done, _all: advance())
+    for note in alignment.notes:
+        print(f"pegbar: warning: {note}", file=sys.stderr)
+    print(f"align: {summary(alignment)}")
+    where = os.path.relpath(stage.folder)
+    print(f"align: {len(stage.numbers)} drawings {'aligned' if made else 'up to date'}, in {where}")
+    return 0
+
+
+def summary(alignment: Alignment) -> str:
+    """Return camera, error and what was guessed in one line."""
+    camera = alignment.cameras[0]
+    usual, worst = float(np.median(alignment.errors)), int(np.argmax(alignment.errors))
+    parts = [
+        f"{alignment.mode} camera, {math.degrees(camera.field_of_view):.0f} degrees wide",
+        f"the clip's root {'stays in place' if alignment.root == 'in_place' else 'travels'}",
+        f"clip and drawing {usual:.1f} px apart (at most {alignment.errors[worst]:.1f})",
+    ]
+    guessed = int(alignment.estimated.sum())
+    if guessed:
+        parts.append(f"{guessed} hidden joints guessed")
+    return ", ".join(parts)

@@ -1,0 +1,114 @@
+"""The clip of a shot: the one that its file names, or the one in a folder that the drawing is like."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pegbar.align.match import Match, Matches, match_clips
+from pegbar.io.clip_folder import read_clips
+from pegbar.io.motion import read_motion
+from pegbar.scene.clip import Clip
+from pegbar.scene.drawing import Drawing
+from pegbar.scene.motion import Motion
+from pegbar.shot.model import ClipSection
+from pegbar.shot.registered import View
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """A clip, the view of it that the drawing shows, where it is, and what a user should know of the choice."""
+
+    path: Path
+    motion: Motion
+    view: View
+    notes: tuple[str, ...]
+
+
+def choose_clip(
+    section: ClipSection, folder: Path, drawing: Drawing, holds: NDArray[np.float64], frame_rate: float
+) -> Choice:
+    """Return the clip that ``section`` names, or the best of its folder, and how the drawing shows it.
+
+    What the section does not say (view, part of the clip) is found by the search. Paths start at ``folder``.
+
+    Raises
+    ------
+    ValueError
+        Where no clip of the folder fits the drawing, naming the best one and its cost.
+    FormatError, OSError
+        For a clip that cannot be read.
+    """
+    notes: list[str] = []
+    if section.path is None:
+        assert section.folder is not None
+        clips = read_clips(folder / section.folder)
+        best = _best(_search(drawing, list(clips.clips), holds, frame_rate), section.folder)
+        path = folder / section.folder / best.clip
+        motion = read_motion(path)
+        notes.append(
+            f"clip: {best.clip}, frames {best.start}-{best.stop - 1}, {best.cost:.1f} degrees from the drawing"
+        )
+        view = _view(best)
+    else:
+        path = folder / section.path
+        motion = read_clip(section, folder, path)
+        if section.azimuth is None or section.elevation is None:
+            part = _named_part(motion, section)
+            best = _best(_search(drawing, [Clip.from_motion(path.name, part)], holds, frame_rate), path.name)
+            view = _view(best, section.start)
+        else:
+            stop = min(section.stop or len(motion.positions), len(motion.positions))
+            if section.start >= stop:
+                raise ValueError(f"clip.start: {path.name} has {len(motion.positions)} frames, got {section.start}")
+            view = View(section.start, stop, section.azimuth, section.elevation, section.mirrored, section.swapped)
+    notes += motion.report.notes if motion.report is not None else ()
+    return Choice(path, motion, view, tuple(notes))
+
+
+def read_clip(section: ClipSection, folder: Path, path: Path) -> Motion:
+    """Read the clip at ``path`` as ``section`` says; see `pegbar.read_motion`."""
+    return read_motion(
+        path,
+        skeleton=folder / section.skeleton if section.skeleton else None,
+        unit=section.unit,
+        up=section.up,
+        frame_rate=section.frame_rate,
+        joints=folder / section.joints if section.joints else None,
+    )
+
+
+def _named_part(motion: Motion, section: ClipSection) -> Motion:
+    part = motion.slice(section.start, section.stop)
+    if not len(part.positions):
+        raise ValueError(f"clip.start: the clip has {len(motion.positions)} frames, got {section.start}")
+    return part
+
+
+def _search(drawing: Drawing, clips: list[Clip], holds: NDArray[np.float64], frame_rate: float) -> Matches:
+    return match_clips(
+        drawing.markers,
+        drawing.names,
+        clips,
+        visible=drawing.visible,
+        frame_rate=frame_rate,
+        holds=holds,
+        loops=False,
+        top=1,
+    )
+
+
+def _best(matches: Matches, name: str) -> Match:
+    if not matches.matches:
+        reasons = "; ".join(f"{clip}: {reason}" for clip, reason in matches.skipped.items())
+        raise ValueError(f"clip: nothing in {name} can be compared with the drawing ({reasons})")
+    return matches.matches[0]
+
+
+def _view(match: Match, offset: int = 0) -> View:
+    return View(
+        match.start + offset, match.stop + offset, match.azimuth, match.elevation, match.mirrored, match.swapped
+    )
