@@ -103,9 +103,7 @@ def _search(
     )
 
 
-def _write_sheet(
-    output: Path, drawing: Drawing, chosen: NDArray[np.intp], folder: ClipFolder, found: Matches
-) -> None:
+def _write_sheet(output: Path, drawing: Drawing, chosen: NDArray[np.intp], folder: ClipFolder, found: Matches) -> None:
     # Pictures take long to import, and the table does without.
     from pegbar.io.frames import write_image
     from pegbar.report.match_sheet import SheetRow, match_sheet

@@ -6,6 +6,7 @@ of a limb's depth (Taylor 2000), and clip and smooth motion together its sign.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +17,7 @@ from pegbar.lift.given import Given, Refinement
 from pegbar.lift.lengths import Drawn, clip_lengths, likely_lengths
 from pegbar.lift.pins import meet_lengths, planted_targets
 from pegbar.lift.projection import known
-from pegbar.lift.proportions import limb_scales, weighted_median
+from pegbar.lift.proportions import drawn_proportions, weighted_median
 from pegbar.lift.rays import fill_marks, mark_noise, metres_per_unit, project, sight_rays, smooth_marks
 from pegbar.lift.rigid import LimbTracks, rigid_limbs
 from pegbar.scene.limb_tree import Link, limb_tree
@@ -36,6 +37,8 @@ DOUBT = 2.0
 LOOSER = 2.0
 
 
+#: Drawn lengths change this much (relative) over time because poses differ from the clip's.
+POSE = 0.03
 #: Metres.
 NO_LENGTH = 1e-4
 
@@ -50,6 +53,8 @@ class _Figure:
     marked: tuple[Floats, Floats]
     noise: Floats
     scales: Floats
+    stretch: float
+    change: float
 
 
 def refine_markers(given: Given, options: Refinement) -> tuple[Floats, Floats]:
@@ -59,14 +64,12 @@ def refine_markers(given: Given, options: Refinement) -> tuple[Floats, Floats]:
         return prior, np.zeros((0, len(limbs)))
     levels = limb_tree(limbs, prior, options.root)
     links = [link for level in levels for link in level]
-    figure = _start(given, links, options.noise)
+    figure = _start(given, links, options)
     rows = [_solve_level(figure, level, lengths, options) for level in levels]
     linked = np.concatenate([np.zeros((0, len(drawn))), *rows])
     ends = np.array([link[:2] for link in links], dtype=np.int64).reshape(-1, 2)
     solved = _all_lengths(figure, limbs, links, linked, lengths)
     rings = sorted(set(range(len(limbs))) - {limb for _, _, limb in links})
-    if options.stretch:
-        figure.points = _onto_rays(figure.points, figure.marked)
     targets = np.full(figure.points.shape, np.nan)
     if options.planted is not None or options.held is not None:
         planted = np.zeros(drawn.shape[:2], bool) if options.planted is None else options.planted
@@ -94,22 +97,26 @@ def _all_lengths(
     return solved
 
 
-def _start(given: Given, links: list[Link], marked_noise: float | None) -> _Figure:
+def _start(given: Given, links: list[Link], options: Refinement) -> _Figure:
     drawn, prior, cameras, lengths = given.drawn, given.prior, given.cameras, given.lengths
     picture, unit = project(prior, cameras), float(np.mean(metres_per_unit(prior, cameras)))
     ends = np.array([link[:2] for link in links], dtype=np.int64).reshape(-1, 2)
     size = float(np.linalg.norm(prior[:, ends[:, 0]] - prior[:, ends[:, 1]], axis=-1).mean(axis=0).sum())
-    deviation = mark_noise(drawn * unit, NATURAL_NOISE * size) if marked_noise is None else marked_noise * unit
+    deviation = mark_noise(drawn * unit, NATURAL_NOISE * size) if options.noise is None else options.noise * unit
     filled = fill_marks(drawn, picture)
     noise = np.where(known(drawn), deviation, HIDDEN_NOISE * size + deviation)
     jolts = np.median(np.abs(np.diff(picture, 2, axis=0)), axis=(0, 2)) + 1e-3 / unit if len(drawn) > 2 else 1.0
     smooth = sight_rays(smooth_marks(filled, noise / unit, np.broadcast_to(jolts, noise.shape[1:])), cameras)
     points = _onto_rays(prior, smooth)
     scales = np.ones(drawn.shape[1])
-    scales[ends[:, 1]] = limb_scales(points, prior, smooth[1], ends)
+    drawn_as = drawn_proportions(points, prior, smooth[1], ends)
+    scales[ends[:, 1]] = drawn_as.scales
     if lengths is not None:
         scales[ends[:, 1]] = _told_scales(scales[ends[:, 1]], prior, links, lengths)
-    return _Figure(points, prior, smooth, sight_rays(filled, cameras), noise, scales)
+    # Rigid limbs of lengths that are told do not change; of lengths to be found, only as far as poses do not explain.
+    stretch = drawn_as.stretch
+    change = stretch if options.stretch else 0.0 if lengths is not None else math.sqrt(max(stretch**2 - POSE**2, 0))
+    return _Figure(points, prior, smooth, sight_rays(filled, cameras), noise, scales, stretch, change)
 
 
 def _told_scales(scales: Floats, prior: Floats, links: list[Link], lengths: Floats) -> Floats:
@@ -157,6 +164,7 @@ def _observed(figure: _Figure, links: list[Link]) -> _Level:
     off = across - (limbs - clip[..., None] * rays)
     doubts = DOUBT * (np.sqrt(np.mean(np.sum(off**2, axis=-1), axis=0) / 2) + LEAST_DOUBT * spans + 1e-9)
     noise = SMOOTHED * np.hypot(figure.noise[:, parents], figure.noise[:, children])
+    noise = np.hypot(noise, figure.change * spans)
     scales = np.column_stack([_jolts(clip[..., None]) + LEAST_JOLT * spans + 1e-9, doubts])
     planar, clip, noise = (np.ascontiguousarray(rows.T) for rows in (np.linalg.norm(across, axis=-1), clip, noise))
     return _Level(links, parents, children, limbs, spans, (planar, clip, noise, scales))
@@ -168,6 +176,10 @@ def _solve_level(figure: _Figure, links: list[Link], lengths: Floats | None, opt
     found = _level_lengths(level, lengths)
     depths = _flipped(_kernels.limb_depths(level.drawn, found), links, options.flips)
     here, marked = figure.points[:, level.parents], _of(figure.marked, level.children)
+    if options.stretch:
+        soft = _soft_depths(level, depths, found, figure.stretch).T
+        figure.points[:, level.children] = _onto_rays(here, marked) + soft[..., None] * marked[1]
+        return found
     tracks = LimbTracks(
         across=(_onto_rays(here, marked) - here).swapaxes(0, 1),
         rays=marked[1].swapaxes(0, 1),
@@ -178,6 +190,15 @@ def _solve_level(figure: _Figure, links: list[Link], lengths: Floats | None, opt
     )
     figure.points[:, level.children] = here + rigid_limbs(tracks, depths, found).swapaxes(0, 1)
     return found
+
+
+def _soft_depths(level: _Level, depths: Floats, lengths: Floats, stretch: float) -> Floats:
+    """The ``depths`` (V, F) that ``lengths`` ask for and the clip's, each as far as it is sure where limbs stretch."""
+    change = np.maximum(stretch * lengths, 1e-9)
+    told = (change * lengths) ** 2 / np.maximum(np.maximum(depths**2, 2 * change * lengths), 1e-12)
+    clip = (level.drawn[3][:, 1:] / DOUBT) ** 2
+    soft: Floats = (clip * depths + told * level.drawn[1]) / (clip + told)
+    return soft
 
 
 def _of(rays: tuple[Floats, Floats], markers: NDArray[np.int64]) -> tuple[Floats, Floats]:

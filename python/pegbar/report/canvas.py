@@ -106,9 +106,7 @@ class Canvas:
         left, top = max(x - rim, 0), max(y - height - rim, 0)
         target = self._pixels[top : max(y + below + rim, 0), left : max(x + width + rim, 0)]
         mask = np.zeros(target.shape[:2], np.uint8)
-        cv2.putText(
-            mask, letters, (x - left, y - top), cv2.FONT_HERSHEY_SIMPLEX, scale, 255, thickness, cv2.LINE_AA
-        )
+        cv2.putText(mask, letters, (x - left, y - top), cv2.FONT_HERSHEY_SIMPLEX, scale, 255, thickness, cv2.LINE_AA)
         cover = (mask[..., None].astype(np.uint16) * alpha + 127) // 255
         _over(np.array([red, green, blue], np.uint16), cover, target)
 

@@ -33,8 +33,7 @@ def lift_row(picture: Picture, alignment: Alignment, markers: Floats, names: Seq
     back = -alignment.cameras[frame].rotation[2]
     azimuth = float(np.degrees(np.arctan2(back[0], back[2])))
     cells = [small, _stick(alignment.clip[frame, known], tuple(names), azimuth, "clip")]
-    for turn in _TURNS:
-        cells.append(_stick(markers, tuple(names), azimuth + turn, f"result {turn}"))
+    cells += [_stick(markers, tuple(names), azimuth + turn, f"result {turn}") for turn in _TURNS]
     return np.concatenate(cells, axis=1)
 
 

@@ -47,13 +47,8 @@ HANGS_ON = {
     **{
         f"{side}_{outer}": f"{side}_{inner}"
         for side in _SIDES
-        for outer, inner in (
-            ("elbow", "shoulder"),
-            ("hand", "elbow"),
-            ("knee", "hip"),
-            ("foot", "knee"),
-            ("toe", "foot"),
-        )
+        for chain in (("shoulder", "elbow", "hand"), ("hip", "knee", "foot", "toe"))
+        for inner, outer in pairwise(chain)
     },
 }
 
