@@ -2,8 +2,8 @@
 
     RAYON_NUM_THREADS=1 python benches/peers.py [name ...]
 
-Names: those of ``NAMES`` (default: all). Peers come with ``pip install ".[peers]"``; one that is missing is said and left
-out. The machine may be noisy: ratios are of medians within one run.
+Names: those of ``NAMES`` (default: all). Peers come with ``pip install ".[peers]"``; one that is missing is said and
+left out. The machine may be noisy: ratios are of medians within one run.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ def case(seed=0, knee=np.inf, frames=6, marks=7):
     drawn = np.where(seen[..., None], rng.uniform(0, 600, (frames, marks, 2)), 0)
     turns = Rotation.from_rotvec(rng.normal(0, 0.2, (frames, 3))).as_matrix() @ np.diag([1, -1, -1])
     centers = np.array([0, -0.3, 6]) + rng.normal(0, 0.3, (frames, 3))
-    terms = Terms(3.0, 4.0, 20.0, 30.0, 0.1, 40.0, np.log(700), knee)
+    terms = Terms(3.0, 4.0, 20.0, 25.0, 30.0, 0.1, 40.0, np.log(700), knee)
     return Shot(drawn, seen, points, np.array([320.0, 180])), Cameras(turns, centers, np.log(500)), terms
 
 

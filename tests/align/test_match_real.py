@@ -54,7 +54,7 @@ def seen(clip, azimuth, *, start=None, seconds=2.0, rate=24.0, elevation=5.0):
 def test_walks_of_other_actors_come_before_runs_jumps_and_dances(clips, name, azimuth):
     marks, _ = seen(clips[name], azimuth)
     others = [clip for clip in clips.values() if WALKS.get(clip.name) != WALKS[name]]
-    found = match_clips(marks, MARKERS, others, frame_rate=24, top=30)
+    found = match_clips(marks, MARKERS, others, frame_rate=24, top=16)
     ranked = [match.clip for match in found.matches if match.clip not in NEITHER]
     firsts = list(dict.fromkeys(ranked))
     assert set(firsts[:5]) <= set(WALKS), firsts[:8]

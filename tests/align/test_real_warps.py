@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from pegbar import film_times, read_motion, retime, root_speeds, sample_markers, time_warp
-from pegbar.scene.body import MARKERS
 from tests.align.walks import clip, distances, from_the_side
 
 PAIRS = [("07_01", "35_01"), ("35_01", "07_01"), ("07_01", "02_01"), ("02_01", "35_01")]

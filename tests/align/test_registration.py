@@ -133,6 +133,9 @@ def test_the_camera_stays_above_ground_and_level():
     assert free.cameras[0].position[1] == pytest.approx(low.position[1], abs=1e-3)
     assert held.cameras[0].position[1] > -0.05
     assert deeper.cameras[0].position[1] == pytest.approx(low.position[1], abs=1e-3)
+    high = seen_by([camera_at(40, elevation=50)] * 12, points)
+    lower = register_cameras(high, points, SIZE, weights={"level": 1.0}, **options).cameras[0]
+    assert -lower.rotation[2, 1] < 0.8 * math.sin(math.radians(50))
     tilt = math.radians(10)
     turn = np.array([[math.cos(tilt), -math.sin(tilt)], [math.sin(tilt), math.cos(tilt)]])
     middle = (np.array(SIZE) - 1) / 2

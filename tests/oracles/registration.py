@@ -19,6 +19,7 @@ def cost(marks, seen, points, middle, rotations, centers, focal, terms):
                 total += squared / count
         roll = rotations[i][0] @ [0, 1, 0]
         total += terms.roll**2 * roll**2
+        total += terms.level**2 * (rotations[i][2] @ [0, 1, 0]) ** 2
         total += terms.ground**2 * max(0, terms.floor - centers[i, 1]) ** 2
     for i in range(1, frames - 1):
         later = Rotation.from_matrix(rotations[i + 1] @ rotations[i].T).as_rotvec()

@@ -108,6 +108,7 @@ def _terms(shot: Shot, settings: Settings, start: Cameras, spread: float) -> Ter
         turn=turn,
         place=turn / depth,
         roll=math.sqrt(weights["roll"]) * spread,
+        level=math.sqrt(weights["level"]) * spread,
         ground=0.0 if settings.floor is None else math.sqrt(weights["ground"]) * math.exp(settings.log_focal) / depth,
         floor=settings.floor or 0.0,
         focal=0.0,

@@ -33,7 +33,7 @@ def read_alignment(path: str | os.PathLike[str]) -> Alignment:
         raise FormatError(path, f"no alignment: {error}") from None
     for name in _TEXTS:
         values[name] = tuple(values[name].tolist())
-    for name in ("mode", "root", "mirrored"):
+    for name in ("mode", "root", "clip_path", "mirrored", "swapped"):
         values[name] = values[name].item()
     width, height = values["image_size"].tolist()
     return Alignment(**{**values, "image_size": (width, height)})

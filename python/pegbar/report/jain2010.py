@@ -80,7 +80,8 @@ def figure9(motions: Mapping[str, Motion], *, registered: bool = True) -> Result
     walker's height, turned once to face as the walk does at its start, and moved to its pelvis in every frame (the
     paper's experiment as far as it is told). "..., whole" turns the clips by their mean facing instead. "...,
     registered" sees the travelling walk through a perspective camera 6 m away and finds the camera of the warped clip
-    with `register_cameras` (free); errors are then relative to the pelvis. ``registered`` false leaves these out.
+    as `pegbar align` does (mode and root "auto"); errors are then relative to the pelvis. ``registered`` false leaves
+    these out.
 
     Raises
     ------
@@ -142,7 +143,7 @@ def _registered(walk: Floats, azimuth: float, points: Floats) -> Floats:
     # For the warp the clip is seen as the walk is: the camera travels with its pelvis.
     beside = points - points[:, :1] + walk.mean(axis=0)[:1]
     frames = warped(drawn, camera.project(beside))
-    track = register_cameras(drawn, points[frames], IMAGE_SIZE, field_of_view=FIELD_OF_VIEW)
+    track = register_cameras(drawn, points[frames], IMAGE_SIZE, field_of_view=FIELD_OF_VIEW, mode="auto", root="auto")
     rows = track.matrices[:, 2]
     depths = np.einsum("fi,fni->fn", rows[:, :3], track.points) + rows[:, 3:]
     truth = camera.depth(walk)

@@ -55,8 +55,8 @@ def table(result: Result) -> list[str]:
     return [
         *lines,
         "",
-        "start: faces as the walk at its start; whole: by the mean facing; registered: a free camera found for the",
-        "clip itself. slow: a slow transcription (not the paper's figures, which are only drawn).",
+        "start: faces as the walk at its start; whole: by the mean facing; registered: the camera that pegbar",
+        "align finds for the clip itself. slow: a slow transcription (not the paper's figures, which are only drawn).",
     ]
 
 

@@ -55,8 +55,8 @@ def warp_picture(
     figure = Figure(figsize=(width / 100, height / 100), dpi=100, layout="constrained")
     canvas = FigureCanvasAgg(figure)
     _draw(figure, table, warp, (clip_offset, clip_step), title)
-    canvas.draw()
-    return np.array(canvas.buffer_rgba(), np.uint8)
+    canvas.draw()  # type: ignore[no-untyped-call]
+    return np.array(canvas.buffer_rgba(), np.uint8)  # type: ignore[no-untyped-call]
 
 
 def _draw(figure: Figure, table: NDArray[np.float64], warp: TimeWarp, clip: tuple[float, float], title: str) -> None:

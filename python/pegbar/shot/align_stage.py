@@ -82,7 +82,11 @@ class AlignStage:
         choice = choose_clip(self.shot.settings.clip, self.shot.folder, drawing, holds, rate)
         alignment, retiming = align_drawing(drawing, choice.motion, choice.view, holds, rate, self._options())
         alignment = dataclasses.replace(
-            alignment, mirrored=choice.view.mirrored, notes=(*choice.notes, *alignment.notes)
+            alignment,
+            clip_path=str(choice.path),
+            mirrored=choice.view.mirrored,
+            swapped=choice.view.swapped,
+            notes=(*choice.notes, *alignment.notes),
         )
         self.folder.mkdir(parents=True, exist_ok=True)
         self._write(drawing, choice, alignment, retiming, progress)

@@ -66,8 +66,7 @@ def align_drawing(
     DegenerateError
         For frames with fewer than four marks, joints on one line and the like, naming frame and joint.
     """
-    clip = mirrored(motion) if view.mirrored else motion
-    clip = _on_the_ground(exchanged(clip) if view.swapped else clip, options.floor)
+    clip = as_drawn(motion, view.mirrored, view.swapped, options.floor)
     there = {*clip.known_markers, *clip.names}
     known = [index for index, name in enumerate(drawing.names) if name in there]
     names = tuple(drawing.names[index] for index in known)
@@ -80,8 +79,10 @@ def align_drawing(
     return _lifted(drawing, known, clip, retiming, track, rate, options), retiming
 
 
-def _on_the_ground(clip: Motion, floor: float | None) -> Motion:
-    """The clip moved up or down so that its floor is at height 0."""
+def as_drawn(motion: Motion, is_mirrored: bool, is_swapped: bool, floor: float | None) -> Motion:
+    """Return a clip's mirror image, its sides exchanged, as asked, and its ``floor`` (None: as found) at height 0."""
+    clip = mirrored(motion) if is_mirrored else motion
+    clip = exchanged(clip) if is_swapped else clip
     if floor is None:
         floor = clip.report.floor if clip.report is not None else None
     return clip.changed(positions=clip.positions - [0.0, floor, 0.0]) if floor else clip

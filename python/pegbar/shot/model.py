@@ -135,6 +135,27 @@ class AlignSection(Section):
     use: Literal["auto", "always", "never"] = "auto"
 
 
+class FlipEntry(Section):
+    """A limb whose depth is turned the other way by hand: the joint at its outer end, and for which drawings."""
+
+    joint: str
+    drawings: str
+
+
+class LiftSection(Section):
+    """``[lift]``: how the drawing becomes a 3D animation, and what is written."""
+
+    output: str = "lift"
+    depth: Literal["clip", "lengths"] = "clip"
+    stretch: bool = False
+    planted: bool = True
+    frame_rate: float | None = Field(default=None, gt=0, allow_inf_nan=False)
+    interpolation: Literal["step", "linear"] = "step"
+    loop: bool = False
+    formats: list[Literal["bvh", "glb", "usd", "csv", "npz"]] = ["bvh", "glb", "csv", "npz"]
+    flips: list[FlipEntry] = []
+
+
 class OutputSection(Section):
     """``[output]``: what is written, as patterns with a frame number."""
 
@@ -170,6 +191,7 @@ class ShotFile(Section):
     drawing: DrawingSection
     clip: ClipSection | None = None
     align: AlignSection = AlignSection()
+    lift: LiftSection = LiftSection()
     camera: CameraSection | None = None
     passes: PassesSection | None = None
     output: OutputSection = Field(default_factory=OutputSection)

@@ -72,7 +72,9 @@ class Shot:
 def open_shot(path: str | Path, *, aligned: bool = True) -> Shot:
     """Read the shot file at ``path`` and find all that it names.
 
-    ``aligned`` False takes the marks as annotated, without what `pegbar align` found. Raises ShotError with every problem at once (missing sequences, unknown limbs, outputs that would replace inputs),
+    ``aligned`` False takes the marks as annotated, without what `pegbar align` found.
+
+    Raises ShotError with every problem at once (missing sequences, unknown limbs, outputs that would replace inputs),
     each with its line; FormatError or FileNotFoundError for an unreadable shot file.
     """
     path = Path(path)
