@@ -73,6 +73,7 @@ def test_the_command_writes_tables_and_a_plot(test_data, tmp_path, monkeypatch, 
     assert "0.73 (0.0045)" in printed
     assert "(0.73): yes (0.64, 0.70, 0.68)" in printed
     assert "10 degrees off: yes" in printed
+    assert "one cycle of 07_01 with its next: clip 0.0050 m, lifted 0.0037 m" in printed
     with (tmp_path / "jain2009-table1.csv").open(newline="") as file:
         rows = list(csv.reader(file))
     assert len(rows) == 1 + 9

@@ -138,6 +138,16 @@ def drawn_lengths(drawn: ArrayLike, prior: ArrayLike, camera: Any, limbs: ArrayL
     ------
     ValueError, DegenerateError
         As in `reconstruct_markers`.
+
+    Examples
+    --------
+    >>> from pegbar import OrthographicCamera
+    >>> angles = np.linspace(-1, 1, 30)
+    >>> turning = 0.4 * np.stack([np.cos(angles), 0 * angles, np.sin(angles)], axis=1)
+    >>> figure = np.stack([0 * turning, turning], axis=1)
+    >>> front = OrthographicCamera.from_angles(0, 0)
+    >>> drawn_lengths(front.project(figure), 1.1 * figure, front, [(0, 1)]).round(2).tolist()
+    [0.4]
     """
     given = Given.checked(drawn, prior, camera, limbs, None)
     return refine_markers(given, Refinement())[1][0] if len(given.prior) else np.zeros(len(given.limbs))

@@ -52,6 +52,8 @@ VIEWS = {"front": (0.0, 10.0), "three-quarter": CAMERA, "side": (90.0, 10.0)}
 #: Deviation of the marks, in pixels of a picture in which a figure of 1.7 m is 500 px tall.
 NOISES = (0, 1, 3, 5)
 METRES_PER_PIXEL = 1.7 / 500
+#: Frames of one cycle (two steps) of the walks.
+CYCLE = 34
 #: The ways to lift: closed form, rigid limbs of unknown length, rigid limbs of known length.
 WAYS = ("closed form", "refine", "refine, lengths given")
 #: The paper's table 1: mean and largest error in metres for each offset, and for the clip alone.
@@ -96,10 +98,14 @@ class Lifted:
 
 @dataclass(frozen=True)
 class Result:
-    """For each pair: lifted with the camera off by `OFFSETS`, and from `VIEWS` with `NOISES` (view, noise)."""
+    """For each pair: lifted with the camera off by `OFFSETS`, and from `VIEWS` with `NOISES` (view, noise).
+
+    ``same`` is the first pair's walk, one cycle of it lifted with the next.
+    """
 
     offsets: Mapping[tuple[str, str], Mapping[tuple[int, int], Lifted]]
     views: Mapping[tuple[str, str], Mapping[tuple[str, int], Lifted]]
+    same: Lifted
 
     def mean_ratio(self, way: str, offset: tuple[int, int] = (0, 0)) -> float:
         """Mean over the pairs of the upper body's ratio."""
@@ -118,7 +124,8 @@ def table1(motions: Mapping[str, Motion]) -> Result:
             for view, angles in VIEWS.items()
             for noise in NOISES
         }
-    return Result(offsets, views)
+    walk = poses[PAIRS[0][0]]
+    return Result(offsets, views, lift_walk(walk[:CYCLE], walk[CYCLE : 2 * CYCLE], CAMERA))
 
 
 def walk_poses(motion: Motion) -> Floats:
