@@ -9,8 +9,8 @@ from scipy.linalg import cho_solve_banded, cholesky_banded, solveh_banded
 Floats = NDArray[np.float64]
 
 _ROUNDS = 80  # the interior point needs 10 to 40
-# Where a bound is met without force the times come only as near as the root of the gap: 1e-4 of a frame.
-_GAP = 1e-8
+# Where a bound is met without force the times come only as near as the root of the gap: 1e-5 of a frame.
+_GAP = 1e-10
 # No bound's slack times force falls below this part of the mean: it would be pinned before the others are settled.
 _CENTRAL = 1e-3
 # Stiffer bounds than this leave the banded matrix without digits; by then the times move by less than 1e-3.
