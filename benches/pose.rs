@@ -12,7 +12,8 @@ const JOINTS: usize = 16;
 /// A swaying figure of points, and its 200th pose seen from the side.
 fn scene() -> (Vec<DVec2>, Vec<DVec3>) {
     let wave = |k: usize, t: f64| 0.5 * (k as f64 * 0.71).sin() + 0.2 * (t * 0.05 + k as f64).sin();
-    let point = |t: usize, k: usize| DVec3::new(0.4 * wave(5 * k, t as f64), wave(7 * k, t as f64), 0.4 * wave(11 * k, 0.0));
+    let point =
+        |t: usize, k: usize| DVec3::new(0.4 * wave(5 * k, t as f64), wave(7 * k, t as f64), 0.4 * wave(11 * k, 0.0));
     let poses: Vec<DVec3> = (0..POSES * JOINTS).map(|i| point(i / JOINTS, i % JOINTS)).collect();
     let side = |k: usize, p: &DVec3| {
         DVec2::new(639.5 - 900.0 * p.z / (4.0 - p.x) + 3.0 * wave(k, 0.0), 359.5 - 900.0 * p.y / (4.0 - p.x))

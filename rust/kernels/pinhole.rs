@@ -197,12 +197,12 @@ impl Normal {
     fn pull(&mut self, weight: f64, residual: Lanes, slopes: [Lanes; 3]) {
         let pull = Lanes::splat(weight * weight);
         self.cost = self.cost + pull * residual * residual;
-        for row in 0..3 {
-            let weighted = pull * slopes[row];
+        for (row, slope) in slopes.iter().enumerate() {
+            let weighted = pull * *slope;
             self.gradient[row + 4] = self.gradient[row + 4] + weighted * residual;
-            for column in 0..=row {
+            for (column, slope) in slopes.iter().enumerate().take(row + 1) {
                 let entry = at(row + 4, column + 4);
-                self.matrix[entry] = self.matrix[entry] + weighted * slopes[column];
+                self.matrix[entry] = self.matrix[entry] + weighted * *slope;
             }
         }
     }
