@@ -2,8 +2,8 @@
 
     RAYON_NUM_THREADS=1 python benches/peers.py [name ...]
 
-Names: composite, depth, raster, batch, motion (default: all). Peers come with ``pip install ".[peers]"``; one that is
-missing is said and left out. The machine may be noisy: ratios are of medians within one run.
+Names: those of ``NAMES`` (default: all). Peers come with ``pip install ".[peers]"``; one that is missing is said and
+left out. The machine may be noisy: ratios are of medians within one run.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any
 os.environ.setdefault("RAYON_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-NAMES = ("composite", "depth", "raster", "batch", "motion")
+NAMES = ("composite", "depth", "raster", "batch", "motion", "match", "warp", "registration", "pose")
 
 
 def main(names: list[str]) -> int:

@@ -39,7 +39,7 @@ VARIANTS: dict[str, dict] = {
 
 
 def shots(folder: Path) -> list[tuple[str, str, DrawnClip, float]]:
-    """Clip, kind, drawing and field of view in degrees of every trial (every third for the terms); three marks in a hundred are 30 px off."""
+    """Clip, kind, drawing and field of view in degrees of every trial; three marks in a hundred are 30 px off."""
     made = []
     for name in CLIPS:
         clip = clip_points(folder, name)

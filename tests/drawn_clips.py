@@ -19,6 +19,7 @@ CLIPS = {
     "02_01": ("bvh/cmu_02_01.bvh", 5),
     "35_17": ("bvh/cmu_35_17.bvh", 4),
     "118_01": ("bvh/cmu_118_01_trim.bvh", 3),
+    "16_05": ("asfamc/16_05.amc", 5),
     "16_11": ("bvh/cmu_16_11.bvh", 5),
 }
 #: From where: azimuth, elevation and field of view in degrees.

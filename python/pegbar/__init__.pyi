@@ -2,9 +2,13 @@ from .align.camera_track import CameraTrack as CameraTrack
 from .align.descriptor import limb_trust as limb_trust
 from .align.descriptor import pose_descriptor as pose_descriptor
 from .align.descriptor import pose_distance as pose_distance
+from .align.match import Match as Match
+from .align.match import Matches as Matches
+from .align.match import match_clips as match_clips
 from .align.pace import RootSpeeds as RootSpeeds
 from .align.pace import film_times as film_times
 from .align.pace import root_speeds as root_speeds
+from .align.parallel_view import find_orthographic as find_orthographic
 from .align.pose import fit_pose as fit_pose
 from .align.pose_fit import PoseFit as PoseFit
 from .align.registration import register_cameras as register_cameras
@@ -20,6 +24,7 @@ from .errors import PegbarError as PegbarError
 from .errors import ShotError as ShotError
 from .io.annotations import read_annotations as read_annotations
 from .io.annotations_writer import write_annotations as write_annotations
+from .io.clip_folder import read_clips as read_clips
 from .io.joint_map import read_joint_map as read_joint_map
 from .io.joint_map import write_joint_map as write_joint_map
 from .io.motion import read_motion as read_motion
@@ -43,8 +48,10 @@ from .lift.contact import GroundedDepths as GroundedDepths
 from .lift.contact import ground_depths as ground_depths
 from .lift.hidden import fill_hidden as fill_hidden
 from .lift.limbs import align_limbs as align_limbs
+from .lift.markers import drawn_lengths as drawn_lengths
 from .lift.markers import reconstruct_markers as reconstruct_markers
 from .scene.camera import PerspectiveCamera as PerspectiveCamera
+from .scene.clip import Clip as Clip
 from .scene.clip_report import ClipReport as ClipReport
 from .scene.contacts import foot_contacts as foot_contacts
 from .scene.drawing import Drawing as Drawing

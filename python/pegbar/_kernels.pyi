@@ -27,6 +27,8 @@ __all__ = [
     "render_passes",
     "resolve_passes",
     "rim_depth",
+    "search_clips",
+    "segment_path",
     "segment_stick_figure",
     "stroke_polyline",
     "time_warp",
@@ -121,9 +123,17 @@ def forward_kinematics(
 def fit_poses(
     joints: _Doubles,
     poses: _Doubles,
-    options: tuple[list[float], float, float | None, float, str, float, int],
+    options: tuple[list[float], float, float | None, list[float], str, float, int],
 ) -> tuple[_Doubles, _Doubles, _Doubles]: ...
 def pose_distance(a: _Doubles, b: _Doubles, weights: _Doubles, a_trust: _Doubles, b_trust: _Doubles) -> _Doubles: ...
 def time_warp(
     cost: _Doubles, open_begin: bool, open_end: bool, slope_limit: int | None
 ) -> tuple[float, NDArray[np.int64]]: ...
+def search_clips(
+    vectors: _Floats,
+    ranges: NDArray[np.uint64],
+    views: _Floats,
+    drawn: tuple[_Floats, _Floats, NDArray[np.uint32], NDArray[np.uint32]],
+    block: int,
+) -> tuple[_Floats, NDArray[np.uint32]]: ...
+def segment_path(costs: _Doubles, steps: NDArray[np.uint32]) -> tuple[NDArray[np.uint32], float]: ...

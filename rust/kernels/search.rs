@@ -61,8 +61,8 @@ pub fn count_blocks(ranges: &[[u64; 2]], block: usize) -> usize {
 impl Drawn<'_> {
     fn check(&self, limbs: usize) -> Result<(), KernelError> {
         let row = self.frames * limbs;
-        if row == 0 {
-            return Err(KernelError::Argument { argument: "angles", problem: "want a frame and a limb" });
+        if row == 0 || self.angles.is_empty() || self.orders.is_empty() {
+            return Err(KernelError::Argument { argument: "angles", problem: "want a frame, a limb and an order" });
         }
         check_length("angles", self.angles.len() / row * row, self.angles.len())?;
         check_length("weights", self.angles.len(), self.weights.len())?;
@@ -95,7 +95,7 @@ pub fn search_clips(
     found: &mut [Found],
 ) -> Result<(), KernelError> {
     drawn.check(clips.limbs)?;
-    let frames = clips.vectors.len() / (3 * clips.limbs);
+    let frames = clips.vectors.len() / (3 * clips.limbs).max(1);
     check_length("vectors", 3 * clips.limbs * frames, clips.vectors.len())?;
     if let Some(index) = clips.ranges.iter().position(|[start, stop]| start > stop || *stop > frames as u64) {
         return Err(KernelError::Item { argument: "ranges", problem: "not within the clips", index });
@@ -105,11 +105,7 @@ pub fn search_clips(
     }
     let paths = drawn.count_paths(clips.limbs);
     check_length("found", count_blocks(clips.ranges, block) * views.len() * paths, found.len())?;
-    if found.is_empty() {
-        return Ok(());
-    }
-    let mut rest = found;
-    let mut pieces = Vec::with_capacity(clips.ranges.len());
+    let (mut rest, mut pieces) = (found, Vec::with_capacity(clips.ranges.len()));
     for range in clips.ranges {
         let (piece, after) = rest.split_at_mut(count_blocks(&[*range], block) * views.len() * paths);
         pieces.push((*range, piece));
@@ -154,7 +150,7 @@ fn turns(x: f32, y: f32) -> f32 {
 }
 
 /// Coefficients of the odd powers in atan(x) / (2 pi) on 0..1.
-const TURNS: [f32; 6] = [0.159151317, -0.052938567, 0.030802907, -0.018529849, 0.008379086, -0.001865158];
+const TURNS: [f32; 6] = [0.15915132, -0.052938566, 0.030802907, -0.01852985, 0.008379086, -0.001865158];
 
 /// Writes the angles of one limb over a piece, in turns.
 #[inline(always)]
@@ -197,18 +193,18 @@ fn search_view(span: Span<'_>, drawn: Drawn<'_>, view: &View, block: usize) -> V
         limb_turns(span, limb, view, &mut angles[limb * length..][..length]);
     }
     let paths = drawn.count_paths(limbs);
-    let mut found = vec![Found { cost: f32::INFINITY, end: span.start as u32 }; length.div_ceil(block) * paths];
+    let mut found = vec![Found::NOTHING; length.div_ceil(block) * paths];
     let mut costs = vec![0.0; frames * length];
     let (mut row, mut after) = (vec![0.0; length], vec![0.0; length]);
     let mut path = 0;
-    let labellings = drawn.angles.chunks(frames * limbs).zip(drawn.weights.chunks(frames * limbs));
-    for (labelling, weights) in labellings {
+    for (labelling, weights) in drawn.angles.chunks(frames * limbs).zip(drawn.weights.chunks(frames * limbs)) {
         costs.fill(0.0);
         for frame in 0..frames {
             let cost = &mut costs[frame * length..][..length];
             for limb in 0..limbs {
                 let (angle, weight) = (labelling[frame * limbs + limb], weights[frame * limbs + limb]);
-                let drawn = angle * std::f32::consts::FRAC_1_PI * 0.5;
+                let whole = angle * std::f32::consts::FRAC_1_PI * 0.5;
+                let drawn = whole - whole.round();
                 add_difference(&angles[limb * length..][..length], drawn, weight, cost);
             }
         }
@@ -262,8 +258,8 @@ pub fn segment_path(costs: &[f64], steps: &[[u32; 2]], path: &mut [u32]) -> Resu
         }
     }
     let last = &sums[(frames - 1) * length..];
-    let end = (0..length).filter(|column| last[*column] < f64::INFINITY).min_by(|a, b| last[*a].total_cmp(&last[*b]));
-    let Some(end) = end else { return Ok(f64::INFINITY) };
+    let ends = (0..length).filter(|column| last[*column] < f64::INFINITY);
+    let Some(end) = ends.min_by(|a, b| last[*a].total_cmp(&last[*b])) else { return Ok(f64::INFINITY) };
     let mut column = end;
     for frame in (0..frames).rev() {
         path[frame] = column as u32;
@@ -283,4 +279,120 @@ fn cheapest(before: &[f64], column: usize, [low, high]: [u32; 2]) -> (f64, u32) 
         }
     }
     best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::TAU;
+
+    const FRONT: View = [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0]];
+    const SIDE: View = [[0.0, 0.0, -1.0], [0.0, -1.0, 0.0]];
+
+    /// A limb that turns: frame f lies at `angles[f]` in the picture seen from the front.
+    fn turning(angles: &[f32]) -> Vec<f32> {
+        let axis = |of: fn(f32) -> f32| angles.iter().map(move |a| of(*a)).collect::<Vec<f32>>();
+        [axis(f32::cos), axis(|a| -a.sin()), axis(|_| 0.0)].concat()
+    }
+
+    fn best(clip: &[f32], drawn: &[f32], steps: [u32; 2], view: View) -> Found {
+        let vectors = turning(clip);
+        let clips = Clips { vectors: &vectors, limbs: 1, ranges: &[[0, clip.len() as u64]] };
+        let order: Vec<u32> = (0..drawn.len() as u32).collect();
+        let (weights, steps) = (vec![1.0; drawn.len()], vec![steps; drawn.len()]);
+        let sequence = Drawn { angles: drawn, weights: &weights, frames: drawn.len(), orders: &order, steps: &steps };
+        let mut found = [Found::NOTHING];
+        assert_eq!(search_clips(clips, sequence, &[view], clip.len(), &mut found), Ok(()));
+        found[0]
+    }
+
+    #[test]
+    fn turns_are_within_a_thousandth_of_a_degree_of_the_arc_tangent() {
+        for step in 0..20_000 {
+            let angle = TAU * (f64::from(step) / 20_000.0 - 0.5);
+            let (y, x) = (angle.sin() as f32 * 3.0, angle.cos() as f32 * 3.0);
+            let exact = f64::from(y).atan2(f64::from(x)) / TAU;
+            let apart = (f64::from(turns(x, y)) - exact).abs();
+            assert!(apart.min(1.0 - apart) * 360.0 < 1e-3, "{angle}");
+        }
+        assert!((turns(0.0, 0.0), turns(0.0, -2.0)) == (0.0, -0.25) && turns(f32::NAN, f32::NAN).is_nan());
+    }
+
+    #[test]
+    fn a_piece_is_found_where_it_is_and_costs_nothing() {
+        let clip: Vec<f32> = (0..40).map(|f| (f as f32 * 0.7).sin() * 1.4).collect();
+        let found = best(&clip, &clip[13..29], [1, 1], FRONT);
+        assert_eq!(found.end, 28);
+        assert!(found.cost < 1e-3, "{}", found.cost);
+        assert!(best(&clip, &clip[13..29], [1, 1], SIDE).cost > 1.0);
+    }
+
+    #[test]
+    fn steps_bound_the_speed_and_a_clip_too_short_has_no_path() {
+        let clip: Vec<f32> = (0..20).map(|f| f as f32 * 0.1).collect();
+        let twice: Vec<f32> = (0..10).map(|f| f as f32 * 0.2).collect();
+        assert!(best(&clip, &twice, [2, 3], FRONT).cost < 1e-3);
+        assert!(best(&clip, &twice, [1, 1], FRONT).cost > 0.5);
+        assert_eq!(best(&clip, &twice, [3, 3], FRONT), Found::NOTHING);
+    }
+
+    #[test]
+    fn a_missing_frame_is_never_taken() {
+        let mut clip: Vec<f32> = (0..9).map(|f| f as f32 * 0.2).collect();
+        clip[4] = f32::NAN;
+        let drawn = [clip[3], 0.8, clip[5]];
+        let around = best(&clip, &drawn, [1, 2], FRONT);
+        assert!(around.cost > 0.1 && around.cost < 0.5, "{around:?}");
+        let after = best(&clip[5..], &drawn, [1, 1], FRONT).cost;
+        assert!((best(&clip, &drawn, [1, 1], FRONT).cost - after).abs() < 1e-5);
+        assert_eq!(best(&[f32::NAN; 4], &drawn, [1, 1], FRONT), Found::NOTHING);
+    }
+
+    #[test]
+    fn every_stretch_of_ends_has_its_best_and_orders_are_rotations() {
+        let clip: Vec<f32> = (0..30).map(|f| f as f32 * std::f32::consts::TAU / 10.0).collect();
+        let vectors = turning(&clip);
+        let clips = Clips { vectors: &vectors, limbs: 1, ranges: &[[0, 12], [12, 30]] };
+        let drawn: Vec<f32> = clip[4..12].iter().map(|a| a % std::f32::consts::TAU).collect();
+        let orders: Vec<u32> = (0..8).chain((0..8).map(|f| (f + 3) % 8)).collect();
+        let sequence = Drawn { angles: &drawn, weights: &[1.0; 8], frames: 8, orders: &orders, steps: &[[1, 1]; 16] };
+        let mut found = [Found::NOTHING; 2 * (2 + 3)];
+        assert_eq!(count_blocks(clips.ranges, 6), 5);
+        assert_eq!(search_clips(clips, sequence, &[FRONT], 6, &mut found), Ok(()));
+        let ends: Vec<u32> = found.iter().step_by(2).map(|best| best.end).collect();
+        assert_eq!(ends[1..], [11, 0, 21, 29]);
+        assert!(found[2].cost < 1e-3 && found[6].cost < 1e-3);
+        assert!(found[0] == Found::NOTHING && found[4] == Found::NOTHING);
+        assert!(found.iter().skip(1).step_by(2).all(|best| best.cost > 0.5));
+    }
+
+    #[test]
+    fn wrong_tables_are_refused_by_name() {
+        let clips = Clips { vectors: &[0.0; 6], limbs: 1, ranges: &[[0, 3]] };
+        let drawn = Drawn { angles: &[0.0], weights: &[1.0], frames: 1, orders: &[0], steps: &[[1, 1]] };
+        let mut found = [Found::NOTHING];
+        let refused =
+            |clips, drawn, block, found: &mut [Found]| match search_clips(clips, drawn, &[FRONT], block, found) {
+                Err(KernelError::Item { argument, .. } | KernelError::Argument { argument, .. }) => argument,
+                Err(KernelError::Length { argument, .. }) => argument,
+                _ => "nothing",
+            };
+        assert_eq!(refused(clips, drawn, 9, &mut found), "ranges");
+        let whole = Clips { ranges: &[[0, 2]], ..clips };
+        assert_eq!(refused(whole, drawn, 0, &mut found), "block");
+        assert_eq!(refused(whole, drawn, 1, &mut found), "found");
+        assert_eq!(refused(whole, Drawn { orders: &[1], ..drawn }, 9, &mut found), "orders");
+        assert_eq!(refused(whole, Drawn { steps: &[[2, 1]], ..drawn }, 9, &mut found), "steps");
+        assert_eq!(refused(whole, Drawn { weights: &[], ..drawn }, 9, &mut found), "weights");
+        assert_eq!(refused(whole, Drawn { angles: &[], frames: 0, ..drawn }, 9, &mut found), "angles");
+    }
+
+    #[test]
+    fn the_path_is_the_cheapest_of_all() {
+        let costs = [3.0, 1.0, 4.0, 1.0, 5.0, 9.0, 2.0, 6.0, 5.0, 3.0, 5.0, 8.0];
+        let mut path = [0; 3];
+        let found = segment_path(&costs, &[[0, 0], [1, 2], [0, 1]], &mut path);
+        assert_eq!((found, path), (Ok(1.0 + 2.0 + 5.0), [1, 2, 2]));
+        assert_eq!(segment_path(&costs, &[[0, 0], [3, 3], [1, 1]], &mut path), Ok(f64::INFINITY));
+    }
 }

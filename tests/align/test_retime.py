@@ -105,7 +105,9 @@ def test_film_times_hold_or_run_on(steps):
     for k, (start, hold) in enumerate(zip(starts, holds, strict=True)):
         assert (stepped[start : start + hold] == drawn[k]).all()
         if k + 1 < len(drawn):
-            np.testing.assert_allclose(np.diff(running[start : start + hold + 1]), (drawn[k + 1] - drawn[k]) / hold)
+            np.testing.assert_allclose(
+                np.diff(running[start : start + hold + 1]), (drawn[k + 1] - drawn[k]) / hold, atol=1e-12
+            )
         else:
             assert (running[start:] == drawn[-1]).all()
 

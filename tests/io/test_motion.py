@@ -5,6 +5,8 @@ import numpy as np
 import pytest
 
 from pegbar import FormatError, map_joints, read_motion, write_joint_map
+from pegbar.io.bvh import write_bvh
+from pegbar.sample.dancer import dance
 from pegbar.scene.body import MARKERS
 from pegbar.scene.conventions import UNITS, up_rotation
 from tests.clips import bvh
@@ -29,10 +31,14 @@ _read = {}
 
 @pytest.fixture
 def clip(request, test_data):
-    """A clip of the shared data and its row in the index; read once for all tests."""
-    name = request.param
+    """A clip of the shared data and its row in the index."""
+    return once(test_data, request.param)
+
+
+def once(folder, name):
+    """A clip and its row in the index, read once for all tests."""
     if name not in _read:
-        _read[name] = read_motion(test_data / name), index(test_data)[name]
+        _read[name] = read_motion(folder / name), index(folder)[name]
     return _read[name]
 
 
@@ -115,22 +121,21 @@ def test_people_go_where_they_face(clip):
 
 
 def test_the_clip_at_a_doubtful_rate_is_named(test_data):
-    doubtful = [
-        name for name in CLIPS for note in read_motion(test_data / name).report.notes if "frame rate may" in note
-    ]
+    notes = {name: " ".join(once(test_data, name)[0].report.notes) for name in CLIPS}
+    doubtful = [name for name in CLIPS if "frame rate may" in notes[name]]
     assert doubtful == ["mocap/bvh/cmu_141_16.bvh"]
 
 
 def test_amc_and_bvh_of_one_walk_agree(test_data):
-    bvh_clip = read_motion(test_data / "mocap/bvh/cmu_02_01.bvh")
-    amc = read_motion(test_data / "mocap/asfamc/02_01.amc")
+    bvh_clip = once(test_data, "mocap/bvh/cmu_02_01.bvh")[0]
+    amc = once(test_data, "mocap/asfamc/02_01.amc")[0]
     joints = ["pelvis", "left_hip", "left_knee", "left_foot", "right_hip", "right_knee", "right_foot"]
     np.testing.assert_allclose(amc.markers(joints), bvh_clip.markers(joints)[1:], atol=1e-4 * UNITS["cmu"])
 
 
 def test_amc_and_c3d_of_one_dance_agree(test_data):
-    amc = read_motion(test_data / "mocap/asfamc/05_13.amc")
-    c3d = read_motion(test_data / "mocap/c3d/cmu_05_13.c3d")
+    amc = once(test_data, "mocap/asfamc/05_13.amc")[0]
+    c3d = once(test_data, "mocap/c3d/cmu_05_13.c3d")[0]
     apart = np.linalg.norm(amc.markers(MARKERS) - c3d.markers(MARKERS), axis=2)
     means = dict(zip(MARKERS, np.nanmean(apart, axis=0), strict=True))
     assert means["pelvis"] < 0.0135
@@ -178,6 +183,41 @@ def test_rotations_take_the_files_axes_to_the_worlds(tmp_path):
             np.testing.assert_allclose(motion.positions[:, joint], want, atol=1e-9)
     assert np.abs(motion.rotations - np.eye(3)).max() > 0.1
     assert motion.ends["head"].tolist() == pytest.approx([0, 0.18, 0])
+
+
+@pytest.mark.parametrize("frames", [1, 2, 3])
+def test_few_frames_are_enough(frames, tmp_path):
+    (tmp_path / "a.bvh").write_text(bvh(np.linspace([0, 0.95, 0], [0, 0.95, 1], frames)))
+    motion = read_motion(tmp_path / "a.bvh", up="Y")
+    assert len(motion.positions) == frames
+    assert motion.rest_frame is None
+    assert motion.report.floor == pytest.approx(0.02)
+    assert motion.report.travel == pytest.approx(0.0 if frames == 1 else 1.0)
+
+
+def test_a_skeleton_without_offsets_is_measured_in_its_frames(tmp_path):
+    """Position channels on every joint, all offsets 0, names that mean nothing."""
+    names, parents, rest = person()
+    order, lines = [], ["HIERARCHY"]
+
+    def joint(index):
+        order.append(index)
+        kind = "ROOT" if parents[index] < 0 else "JOINT"
+        lines.append(f"{kind} j{index} {{ OFFSET 0 0 0 CHANNELS 3 Xposition Yposition Zposition")
+        children = [child for child, parent in enumerate(parents) if parent == index]
+        for child in children:
+            joint(child)
+        lines.append("}" if children else "End Site { OFFSET 0 0 0 } }")
+
+    joint(0)
+    local = [rest[i] - (rest[parents[i]] if parents[i] >= 0 else 0) for i in order]
+    row = " ".join(f"{100 * value:.3f}" for value in np.ravel(local))
+    lines += ["MOTION", "Frames: 5", "Frame Time: 0.04", *[row] * 5]
+    (tmp_path / "a.bvh").write_text("\n".join(lines) + "\n")
+    motion = read_motion(tmp_path / "a.bvh")
+    assert motion.report.unit_from == "a person's height: cm"
+    assert motion.report.missing == ()
+    assert motion.joint_map["left_knee"] == f"j{names.index('left knee')}"
 
 
 def test_a_head_down_axis_that_is_given_is_doubted(tmp_path):
@@ -284,9 +324,22 @@ def test_a_wrong_line_of_a_joint_map_is_named(tmp_path):
         read_motion(tmp_path / "a.bvh", joints=tmp_path / "map.toml")
 
 
+def test_the_sample_clip_comes_back(tmp_path):
+    """Names that are the canonical markers' own: positions are the joints', in whatever unit they were written."""
+    clip = dance().clip
+    write_bvh(tmp_path / "a.bvh", clip, unit="inch")
+    motion = read_motion(tmp_path / "a.bvh")
+    np.testing.assert_allclose(motion.markers(clip.names), clip.positions, atol=1e-6)
+    np.testing.assert_allclose(motion.markers(MARKERS), clip.markers(MARKERS), atol=1e-6)
+    report = motion.report
+    assert (report.unit, report.up, motion.rest_frame, report.way) == (UNITS["inch"], "y", None, "on the spot")
+    assert report.floor == pytest.approx(0.02, abs=0.005)  # the toes' joints are 2 cm above the floor
+    assert report.notes == ()
+
+
 def test_schemes_and_files_agree(test_data):
     """The names typed for the tests are those of the files."""
     for scheme, name in {"cmu": "bvh/cmu_07_01.bvh", "cmu, 3ds Max naming": "bvh/cmu_131_01_max.bvh"}.items():
-        motion = read_motion(test_data / "mocap" / name)
+        motion = once(test_data, f"mocap/{name}")[0]
         assert sorted(motion.names) == sorted(SCHEMES[scheme][0].split())
         assert motion.joint_map == map_joints(SCHEMES[scheme][0].split())

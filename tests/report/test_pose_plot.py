@@ -62,6 +62,12 @@ def test_missing_points_leave_gaps(motion):
     assert len(places(panel(plot_poses(motion.changed(positions=gone), [3]), 0), LEFT)) > 0
 
 
+@pytest.mark.parametrize("count", [1, 3, 4, 7])
+def test_any_number_of_poses(motion, count):
+    picture = plot_poses(motion, range(count))
+    assert len(places(panel(picture, 1), LEFT)) > 100
+
+
 @pytest.mark.parametrize("frame", [-1, 30])
 def test_frames_that_are_not_there_are_named(motion, frame):
     with pytest.raises(ValueError, match=f"^frames: the motion has no frame {frame}"):

@@ -69,3 +69,13 @@ def test_wrong_arguments_are_named():
         foot_contacts(np.zeros((1, 3, 3)), NAMES, 0)
     with pytest.raises(ValueError, match="^contacts: "):
         ankle_heights(np.zeros((1, 3, 3)), NAMES, [[True]])
+
+
+def test_a_slow_slide_never_begins_a_step_and_tiptoe_is_not_flat():
+    clip = np.zeros((48, 3, 3))
+    clip[:, 1, 0] = 0.45 / 24 * np.arange(48)
+    clip[30:, 2, 1] = 0.2
+    found = foot_contacts(clip, NAMES, 24.0)
+    assert not found[:, 0].any()
+    assert found[:29, 1].all()
+    assert not found[31:, 1].any()

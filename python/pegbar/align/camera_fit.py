@@ -103,11 +103,12 @@ def _terms(shot: Shot, settings: Settings, start: Cameras, spread: float) -> Ter
     """Return the terms' factors; a metre has the pixels that it has at the figure."""
     weights = settings.weights
     depth = float(np.median(np.linalg.norm(figure_middles(shot) - start.centers, axis=1)))
-    turn = 2 * spread * math.sqrt(weights["smooth"]) * (settings.window / HALF_POWER) ** 2
+    turn = 1.5 * spread * math.sqrt(weights["smooth"]) * (settings.window / HALF_POWER) ** 2
     return Terms(
         turn=turn,
         place=turn / depth,
         roll=math.sqrt(weights["roll"]) * spread,
+        level=math.sqrt(weights["level"]) * spread,
         ground=0.0 if settings.floor is None else math.sqrt(weights["ground"]) * math.exp(settings.log_focal) / depth,
         floor=settings.floor or 0.0,
         focal=0.0,

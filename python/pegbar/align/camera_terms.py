@@ -56,14 +56,16 @@ class Shot:
 class Terms:
     """What multiplies the residuals, and where the data term stops being quadratic.
 
-    ``turn`` is in pixels a radian and ``place`` in pixels a metre, both for second differences over time; ``roll`` in
-    pixels a unit of the sine of roll, ``ground`` in pixels a metre below ``floor`` (metres), ``focal`` in pixels a unit
-    of log focal length away from ``usual_focal`` (log pixels). Beyond ``knee`` pixels a mark counts linearly (Huber).
+    ``turn`` is in pixels a radian and ``place`` in pixels a metre, both for second differences over time; ``roll`` and
+    ``level`` in pixels a unit of the sine of roll and of elevation, ``ground`` in pixels a metre below ``floor``
+    (metres), ``focal`` in pixels a unit of log focal length away from ``usual_focal`` (log pixels). Beyond ``knee``
+    pixels a mark counts linearly (Huber).
     """
 
     turn: float
     place: float
     roll: float
+    level: float
     ground: float
     floor: float
     focal: float
@@ -149,6 +151,7 @@ def cost(shot: Shot, cameras: Cameras, terms: Terms) -> float:
     for scale, jolt in zip((terms.turn, terms.place), jolts(cameras), strict=True):
         total += scale**2 * np.sum(jolt**2)
     total += terms.roll**2 * np.sum(cameras.rotations[:, 0, 1] ** 2)
+    total += terms.level**2 * np.sum(cameras.rotations[:, 2, 1] ** 2)
     total += terms.ground**2 * np.sum(np.maximum(0, terms.floor - cameras.centers[:, 1]) ** 2)
     return float(total + (terms.focal * (cameras.log_focal - terms.usual_focal)) ** 2)
 
@@ -188,12 +191,15 @@ def normal(shot: Shot, cameras: Cameras, terms: Terms, unknowns: Unknowns) -> No
 
 
 def _add_single(whole: Floats, slope: Floats, cameras: Cameras, terms: Terms) -> None:
-    """Add roll and ground of every frame and, to the first frame's focal column, the usual focal length."""
-    sine = cameras.rotations[:, 0, 1]
-    by_turn = np.zeros((len(sine), 3))
-    by_turn[:, 1], by_turn[:, 2] = cameras.rotations[:, 2, 1], -cameras.rotations[:, 1, 1]
-    whole[:, TURN, TURN] += terms.roll**2 * by_turn[:, :, None] * by_turn[:, None, :]
-    slope[:, TURN] += terms.roll**2 * sine[:, None] * by_turn
+    """Add roll, level and ground of every frame and, to the first frame's focal column, the usual focal length."""
+    right, down, ahead = (cameras.rotations[:, row, 1] for row in range(3))
+    none = np.zeros_like(right)
+    for scale, sine, by_turn in (
+        (terms.roll, right, np.stack([none, ahead, -down], axis=1)),
+        (terms.level, ahead, np.stack([down, -right, none], axis=1)),
+    ):
+        whole[:, TURN, TURN] += scale**2 * by_turn[:, :, None] * by_turn[:, None, :]
+        slope[:, TURN] += scale**2 * sine[:, None] * by_turn
     below = np.maximum(0, terms.floor - cameras.centers[:, 1])
     whole[:, PLACE, PLACE][:, 1, 1] += terms.ground**2 * (below > 0)
     slope[:, _HEIGHT] -= terms.ground**2 * below

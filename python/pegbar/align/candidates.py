@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,19 +13,20 @@ from numpy.typing import NDArray
 from pegbar import _kernels
 from pegbar.align.marks import Marks
 from pegbar.scene.clip import Clip
-from pegbar.scene.orthographic import OrthographicCamera
 
-#: Where the camera may stand: degrees, all round and a little below to well above.
-AZIMUTHS = tuple(range(0, 360, 15))
-ELEVATIONS = (-15, 0, 15, 30)
+#: Where the camera may stand at first, in degrees. Twice as many azimuths and elevations rank the clips no better
+#: (docs/papers.md); between these the second pass climbs.
+AZIMUTHS = tuple(range(0, 360, 30))
+ELEVATIONS = (0, 20)
 # Drawings a second that the first pass looks at: half the warp's reach at the clips' 30 frames a second.
 _DRAWN_RATE = 12.5
 # Clips are taken together up to so many frames, and cut into pieces of so many: a piece's rows stay in the cache.
 _TOGETHER = 1 << 16
 _PIECE = 4096
 _PER_CLIP = 4
-# Exchanged sides must fit better by this share and angle before they are believed: a walk is nearly its own mirror image.
-_EXCHANGE_SHARE, _EXCHANGE_ANGLE = 1.08, np.radians(0.4)
+# Exchanged sides must fit better by this share and angle to be believed: a walk is nearly its own mirror image.
+_EXCHANGE_SHARE, _EXCHANGE_ANGLE = 1.08, float(np.radians(0.4))
+Cost = TypeVar("Cost", float, NDArray[np.float32])
 
 
 @dataclass(frozen=True)
@@ -55,8 +58,17 @@ def find_candidates(clips: Sequence[Clip], marks: Marks, speed: float, count: in
         steps = np.stack([marks.steps(o, which, rate, speed) for which in range(len(marks.times)) for o in orders])
         tables = _Tables(marks, np.tile(orders, (len(marks.times), 1)), drawings, steps)
         found += _search([clips[index] for index in group], group, marks, tables)
-        found = sorted(found, key=lambda candidate: (candidate.cost, candidate.clip, candidate.end))[: 4 * count]
+        found = sorted(found, key=_rank)[: 4 * count]
     return found[:count]
+
+
+def believed(cost: Cost, exchanged: int) -> Cost:
+    """What a cost in radians counts in the ranking: more where sides are exchanged."""
+    return cost * _EXCHANGE_SHARE + _EXCHANGE_ANGLE if exchanged else cost
+
+
+def _rank(candidate: Candidate) -> tuple[float, int, int]:
+    return believed(candidate.cost, candidate.exchanged), candidate.clip, candidate.end
 
 
 class _Tables:
@@ -93,11 +105,15 @@ def _groups(clips: Sequence[Clip]) -> Iterator[list[int]]:
             yield group
 
 
-def views(azimuths: Sequence[float], elevations: Sequence[float]) -> tuple[NDArray[np.float32], list[tuple[float, float]]]:
-    """The picture's axes (V, 2, 3) of every view, and its azimuth and elevation in degrees."""
+def views(
+    azimuths: Sequence[float], elevations: Sequence[float]
+) -> tuple[NDArray[np.float32], list[tuple[float, float]]]:
+    """The picture's axes (V, 2, 3) of every view, right and down, and its azimuth and elevation in degrees."""
     places = [(float(azimuth), float(elevation)) for elevation in elevations for azimuth in azimuths]
-    axes = [OrthographicCamera.from_angles(*place).rotation[:2] for place in places]
-    return np.array(axes, np.float32), places
+    (sa, ca), (se, ce) = ((np.sin(angle), np.cos(angle)) for angle in np.radians(places).T)
+    right = np.stack([ca, 0 * ca, -sa], axis=1)
+    down = np.stack([sa * se, -ce, ca * se], axis=1)
+    return np.stack([right, down], axis=1).astype(np.float32), places
 
 
 def line_vectors(markers: NDArray[np.float32], pairs: NDArray[np.intp]) -> NDArray[np.float32]:
@@ -111,15 +127,15 @@ def line_vectors(markers: NDArray[np.float32], pairs: NDArray[np.intp]) -> NDArr
 def _search(clips: list[Clip], numbers: list[int], marks: Marks, tables: _Tables) -> Iterator[Candidate]:
     starts = np.concatenate([[0], np.cumsum([len(clip.markers) for clip in clips])])
     block = max(tables.least // 2, 8)
-    ranges = [piece for a, b in zip(starts[:-1], starts[1:], strict=True) for piece in _pieces(a, b, tables.reach)]
+    ranges = [piece for a, b in pairwise(starts.tolist()) for piece in _pieces(a, b, tables.reach)]
     vectors = np.concatenate([line_vectors(clip.markers, marks.pairs) for clip in clips], axis=2)
     axes, places = views(AZIMUTHS, ELEVATIONS)
     drawn = (tables.angles, tables.shares, tables.rows, tables.steps)
     costs, ends = _kernels.search_clips(vectors, np.array(ranges, np.uint64), axes, drawn, block)
     shape = (len(costs), len(places), 2, len(tables.orders))
-    believed = costs.reshape(shape).copy()
-    believed[:, :, 1] = believed[:, :, 1] * _EXCHANGE_SHARE + _EXCHANGE_ANGLE
-    best = believed.reshape(len(costs), -1).argmin(axis=1)
+    ranked = costs.reshape(shape).copy()
+    ranked[:, :, 1] = believed(ranked[:, :, 1], 1)
+    best = ranked.reshape(len(costs), -1).argmin(axis=1)
     rows = np.arange(len(costs))
     cost, end = costs[rows, best], ends[rows, best].astype(np.intp)
     owner = np.searchsorted(starts, end, side="right") - 1
@@ -147,7 +163,7 @@ def _pieces(start: int, stop: int, reach: int) -> Iterator[tuple[int, int]]:
 
 
 def _apart(cost: NDArray[np.float32], end: NDArray[np.intp], owner: NDArray[np.intp], space: int) -> Iterator[int]:
-    """Rows with a path, the cheapest first, that do not end near a cheaper one of the same clip; a few for each clip."""
+    """Rows with a path, the cheapest first, that do not end near a cheaper one of the same clip; a few a clip."""
     taken: dict[int, list[int]] = {}
     for row in np.argsort(cost, kind="stable"):
         if not np.isfinite(cost[row]):

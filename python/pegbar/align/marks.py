@@ -42,8 +42,8 @@ _FORESHORTENED = 0.5
 _LEAST = 0.25
 _HIDDEN = 0.5
 _FEWEST = 4
-# More turns of a cycle are not tried at first: they lie closer together than the warp reaches.
-_TURNS = 8
+#: At how many of its drawings a cycle is begun at first: between these the warp reaches.
+TURNS = 8
 
 
 def exchange(names: Sequence[str]) -> list[int]:
@@ -94,7 +94,7 @@ class Marks:
         return normed
 
     def movement(self) -> float:
-        """How far the drawings are from one held pose: the mean angle in radians to the drawing that is nearest to all."""
+        """How far the drawings are from a held pose: the mean angle in radians to the one that is nearest to all."""
         angles, shares = self.angles[0], self.shares()[0]
         candidates = range(0, len(angles), max(1, len(angles) // 24))
         return min(float((internal(angles - angles[index]) * shares).sum()) for index in candidates)
@@ -108,11 +108,11 @@ class Marks:
                 kept.append(index)
         return np.array(kept)[:: -(-len(kept) // 64)]
 
-    def orders(self, drawings: Integers, every: bool = False) -> Integers:
+    def orders(self, drawings: Integers) -> Integers:
         """Orders (n, f) in which ``drawings`` (f,) may be gone through: a cycle may begin anywhere."""
         if not self.loops or len(drawings) < 2:
             return drawings[None]
-        step = 1 if every else max(1, len(drawings) // _TURNS)
+        step = max(1, len(drawings) // TURNS)
         return np.stack([np.roll(drawings, -turn) for turn in range(0, len(drawings), step)])
 
     def steps(self, order: Integers, which: int, rate: float, speed: float) -> NDArray[np.uint32]:

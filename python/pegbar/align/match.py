@@ -1,22 +1,25 @@
 """Which clip a drawn sequence is like: which frames, at which times, seen from where (Jain et al. 2009, s3.2-3.3).
 
-The camera is not known: every azimuth and some elevations are tried under parallel rays, with the marks as they are and with
-left and right exchanged. The cost is equation 4 as a mean: the angle between a drawn limb and the clip's.
+The camera is not known: every azimuth and some elevations are tried under parallel rays, with the marks as they are and
+with left and right exchanged. The cost is equation 4 as a mean: the angle between a drawn limb and the clip's.
 """
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pegbar import arrays
-from pegbar.align.candidates import find_candidates
+from pegbar.align.candidates import believed, find_candidates
 from pegbar.align.marks import EXCHANGED, Marks, read_marks
+from pegbar.align.mixed import mixed_up
 from pegbar.align.refine import Aligned, Refiner
-from pegbar.align.sides import Sides, mirror, tell_sides
+from pegbar.align.sides import mirror, seen_from, tell_sides
 from pegbar.scene.body import MARKERS
 from pegbar.scene.clip import Clip
 from pegbar.scene.orthographic import OrthographicCamera
@@ -26,7 +29,7 @@ Floats = NDArray[np.float64]
 #: often right and wrong clips stay below them.
 FITS, DOUBTFUL = (4.0, 0.3), (5.0, 0.4)
 # A few drawings hold no movement that could be told from another: they are only poses.
-_POSES, FITS_POSE, DOUBTFUL_POSE = 3, 6.0, 10.0
+_POSES, FITS_POSE, DOUBTFUL_POSE = 3, 5.0, 8.0
 _SPEED = 2.0
 
 
@@ -44,6 +47,8 @@ class Match:
         The file's frame at each drawn frame, in fractions. Never decreasing, but where a cycle begins anew.
     azimuth, elevation : float
         Where the camera stands, in degrees, as `OrthographicCamera.from_angles` takes them.
+    seen_from : str
+        The side of the person that the camera sees: "front", "front left", "left" and so on.
     mirrored : bool
         The clip's mirror image is meant: reflected in x = 0, left and right joints exchanged.
     swapped : bool
@@ -61,6 +66,8 @@ class Match:
     drawing_rate : float
         Drawings a second: as given, or the likeliest of those tried.
     verdict : {"fits", "doubtful", "no"}
+    mixed : dict of str to (n,) int
+        "arms" or "legs" -> the drawn frames where these seem to be marked on the wrong sides; for matches that fit.
     """
 
     clip: str
@@ -69,6 +76,7 @@ class Match:
     times: Floats
     azimuth: float
     elevation: float
+    seen_from: str
     mirrored: bool
     swapped: bool
     sides: str
@@ -78,6 +86,7 @@ class Match:
     differences: Floats
     drawing_rate: float
     verdict: str
+    mixed: Mapping[str, NDArray[np.intp]]
 
     @property
     def camera(self) -> OrthographicCamera:
@@ -178,8 +187,9 @@ def match_clips(
     searched = [clip for clip in clips if clip.name not in skipped]
     refiner = Refiner(marks, speed)
     candidates = find_candidates(searched, marks, speed, max(3 * top, 24))
-    refined = [(searched[c.clip], refiner.refine(searched[c.clip], c)) for c in candidates]
-    aligned = sorted(((clip, found) for clip, found in refined if found), key=lambda pair: pair[1].cost)
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        refined = list(pool.map(lambda c: (searched[c.clip], refiner.refine(searched[c.clip], c)), candidates))
+    aligned = sorted(((clip, found) for clip, found in refined if found), key=_rank)
     movement = float(np.degrees(marks.movement()))
     limits = _limits(movement, len(marks.times[0]))
     kept: list[Match] = []
@@ -231,14 +241,12 @@ def _limits(movement: float, drawings: int) -> tuple[float, float]:
     return FITS[0] + FITS[1] * movement, DOUBTFUL[0] + DOUBTFUL[1] * movement
 
 
-def _match(
-    clip: Clip, found: Aligned, marks: Marks, seen: NDArray[np.bool_], limits: tuple[float, float]
-) -> Match:
+def _match(clip: Clip, found: Aligned, marks: Marks, seen: NDArray[np.bool_], limits: tuple[float, float]) -> Match:
     times = clip.file_frames(found.times[marks.source])
-    sides: Sides = tell_sides(
-        clip.at(times), found.azimuth, found.elevation, bool(found.candidate.exchanged), seen
-    )
+    markers = clip.at(times)
+    sides = tell_sides(markers, found.azimuth, found.elevation, bool(found.candidate.exchanged), seen)
     cost = float(np.degrees(found.cost))
+    verdict = "fits" if cost <= limits[0] else "doubtful" if cost <= limits[1] else "no"
     return Match(
         clip=clip.name,
         start=int(np.rint(times.min())),
@@ -246,6 +254,7 @@ def _match(
         times=times,
         azimuth=round(sides.azimuth, 2),
         elevation=round(sides.elevation, 2),
+        seen_from=seen_from(mirror(markers) if sides.mirrored else markers, sides.azimuth),
         mirrored=sides.mirrored,
         swapped=sides.swapped,
         sides=sides.words,
@@ -254,8 +263,19 @@ def _match(
         lines=tuple(line.name for line in marks.lines),
         differences=np.degrees(found.differences)[marks.source],
         drawing_rate=marks.rates[found.candidate.which],
-        verdict="fits" if cost <= limits[0] else "doubtful" if cost <= limits[1] else "no",
+        verdict=verdict,
+        mixed=_mixed(found, marks) if verdict == "fits" else {},
     )
+
+
+def _rank(pair: tuple[Clip, Aligned]) -> float:
+    return believed(pair[1].cost, pair[1].candidate.exchanged)
+
+
+def _mixed(found: Aligned, marks: Marks) -> dict[str, NDArray[np.intp]]:
+    which = found.candidate.exchanged
+    drawings = mixed_up(marks.angles[which], found.angles, marks.trust[which], marks.lines)
+    return {group: np.flatnonzero(np.isin(marks.source, frames)) for group, frames in drawings.items()}
 
 
 def _overlap(match: Match, other: Match) -> bool:

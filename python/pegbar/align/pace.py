@@ -49,7 +49,8 @@ def film_times(times: ArrayLike, holds: ArrayLike, *, stepped: bool = True) -> F
     if stepped or not len(drawn):
         return np.repeat(drawn, lengths)
     starts = np.cumsum(lengths) - lengths
-    return np.interp(np.arange(lengths.sum()), starts, drawn)
+    running: Floats = np.interp(np.arange(lengths.sum()), starts, drawn)
+    return running
 
 
 class RootSpeeds(NamedTuple):

@@ -10,26 +10,27 @@ from numpy.typing import NDArray
 from pegbar import _kernels
 from pegbar.align.candidates import Candidate, line_vectors, views
 from pegbar.align.descriptor import pose_descriptor, pose_distance
-from pegbar.align.marks import Marks, internal
+from pegbar.align.marks import TURNS, Marks, internal
 from pegbar.scene.clip import Clip, interpolate
 from pegbar.scene.orthographic import OrthographicCamera
 
 Floats = NDArray[np.float64]
-# Frames a second at which times are found: CMU's own rate.
-_RATE = 120.0
+# Frames a second at which times are found (CMU's own rate), and at which views are tried with a part of the drawings.
+_RATE, _VIEW_RATE, _DRAWN_RATE = 120.0, 60.0, 12.5
 # Degrees by which the view is moved, in turn, until no neighbour is better.
-_TURNS = (7.5, 3.75, 1.5, 0.75)
+_TURNS = (15.0, 7.5, 3.75, 1.5, 0.75)
 _LOWEST, _HIGHEST = -45.0, 60.0
 
 
 @dataclass(frozen=True, eq=False)
 class Aligned:
-    """A candidate seen from its best side: clip frame of every drawing (F,), angle differences (F, K) in radians."""
+    """A candidate from its best side: clip frame of every drawing (F,), angles and differences (F, K) in radians."""
 
     candidate: Candidate
     azimuth: float
     elevation: float
     times: Floats
+    angles: Floats
     differences: Floats
     cost: float
 
@@ -43,32 +44,30 @@ class Refiner:
 
     def refine(self, clip: Clip, candidate: Candidate) -> Aligned | None:
         """Return the candidate's best alignment, or None where the clip is too short about it."""
-        order = self._order(candidate)
-        steps = self.marks.steps(order, candidate.which, _RATE, self.speed)
-        window = _Window(clip, candidate.end, int(steps[:, 1].sum()))
-        place = self._climb(window, candidate, order, steps)
+        place = self._climb(clip, candidate)
         camera = OrthographicCamera.from_angles(*place)
-        path, cost = self._align(window, camera, candidate.exchanged, order, steps)
+        times, cost = self._align(clip, candidate, camera)
         if not np.isfinite(cost):
             return None
-        times = np.empty(len(order))
-        times[order] = window.times[path]
         angles = pose_descriptor(camera.project(interpolate(clip.markers, times)), self.marks.pairs)
         differences = internal(angles - self.marks.angles[candidate.exchanged])
-        return Aligned(candidate, place[0] % 360, place[1], times, differences, cost)
+        return Aligned(candidate, place[0] % 360, place[1], times, angles, differences, cost)
 
-    def _order(self, candidate: Candidate) -> NDArray[np.intp]:
-        return np.roll(np.arange(self.marks.angles.shape[1]), -candidate.turn)
+    def _order(self, drawings: NDArray[np.intp], candidate: Candidate) -> NDArray[np.intp]:
+        return np.roll(drawings, -int(np.searchsorted(drawings, candidate.turn)))
 
-    def _climb(
-        self, window: _Window, candidate: Candidate, order: NDArray[np.intp], steps: NDArray[np.uint32]
-    ) -> tuple[float, float]:
+    def _climb(self, clip: Clip, candidate: Candidate) -> tuple[float, float]:
+        """The view, in degrees, that no view near it betters."""
+        drawings = self.marks.thinned(_DRAWN_RATE)
+        order = self._order(drawings, candidate)
+        steps = self.marks.steps(order, candidate.which, _VIEW_RATE, self.speed)
+        window = _Window(clip, candidate.end, int(steps[:, 1].sum()), _VIEW_RATE)
         vectors = line_vectors(window.markers, self.marks.pairs)
         which = slice(candidate.exchanged, candidate.exchanged + 1)
         drawn = (
-            np.ascontiguousarray(self.marks.angles[which], np.float32),
-            np.ascontiguousarray(self.shares[which], np.float32),
-            order[None].astype(np.uint32),
+            np.ascontiguousarray(self.marks.angles[which, order], np.float32),
+            np.ascontiguousarray(self.shares[which, order], np.float32),
+            np.arange(len(order), dtype=np.uint32)[None],
             steps[None],
         )
         whole = np.array([[0, len(window.markers)]], np.uint64)
@@ -84,29 +83,39 @@ class Refiner:
                 place = best
         return place
 
-    def _align(
-        self,
-        window: _Window,
-        camera: OrthographicCamera,
-        exchanged: int,
-        order: NDArray[np.intp],
-        steps: NDArray[np.uint32],
-    ) -> tuple[NDArray[np.uint32], float]:
-        """The cheapest path and its mean angle."""
-        marks = self.marks
+    def _align(self, clip: Clip, candidate: Candidate, camera: OrthographicCamera) -> tuple[Floats, float]:
+        """Times (F,) in clip frames on the cheapest path, and its mean angle in radians."""
+        marks, exchanged = self.marks, candidate.exchanged
+        drawings = np.arange(marks.angles.shape[1])
+        ways = []
+        for turn in self._turns(candidate):
+            order = np.roll(drawings, -turn)
+            ways.append((order, marks.steps(order, candidate.which, _RATE, self.speed)))
+        window = _Window(clip, candidate.end, max(int(steps[:, 1].sum()) for _, steps in ways), _RATE)
         projected = pose_descriptor(camera.project(window.markers), marks.pairs)
-        table = pose_distance(
-            marks.angles[exchanged], projected, weights=marks.weights, a_trust=marks.trust[exchanged]
-        )
-        path, cost = _kernels.segment_path(table[order], steps)
-        return path, cost / (marks.weights.sum() * len(order))
+        table = pose_distance(marks.angles[exchanged], projected, weights=marks.weights, a_trust=marks.trust[exchanged])
+        times, best = np.zeros(len(drawings)), np.inf
+        for order, steps in ways:
+            path, cost = _kernels.segment_path(table[order], steps)
+            if cost < best:
+                best = cost
+                times[order] = window.times[path]
+        return times, best / (marks.weights.sum() * len(drawings))
+
+    def _turns(self, candidate: Candidate) -> list[int]:
+        """Drawings at which a cycle may begin: the first pass tries only some of them."""
+        count = self.marks.angles.shape[1]
+        if not self.marks.loops:
+            return [candidate.turn]
+        reach = -(-count // TURNS)
+        return sorted({(candidate.turn + turn) % count for turn in range(-reach, reach + 1)})
 
 
 class _Window:
-    """The part of a clip that paths to about frame ``end`` may use, at the rate at which times are found."""
+    """The part of a clip that paths of ``reach`` frames to about frame ``end`` may use, at another ``rate``."""
 
-    def __init__(self, clip: Clip, end: int, reach: int) -> None:
-        finer = _RATE / clip.rate
+    def __init__(self, clip: Clip, end: int, reach: int, rate: float) -> None:
+        finer = rate / clip.rate
         first = max(end - int(np.ceil(reach / finer)) - 2, 0)
         # The end was found among frames of the even rate and of a part of the drawings.
         last = min(end + int(np.ceil(0.25 * clip.rate)), len(clip.markers) - 1)

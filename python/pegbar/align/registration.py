@@ -49,9 +49,10 @@ def register_cameras(
 
     Minimised is the sum over frames of squared pixels: the mean distance of projected and drawn joints; second
     differences of the camera's orientation and place, as they turn and shift a mark at the figure's edge, times
-    (window / 2.78)^2 ("smooth"); the sine of roll times the figure's spread ("roll"); how deep below the floor the
-    camera is, as seen at the figure ("ground"); and, once a shot, the logarithm of the focal length over the usual one,
-    times the marks' noise over a spread of 0.35 and the root of the window ("field_of_view").
+    (window / 2.78)^2 ("smooth"); the sines of roll and of elevation times the figure's spread ("roll", "level"); how
+    deep below the floor the camera is, as seen at the figure ("ground"); and, once a shot, the logarithm of the focal
+    length over the usual one, times the marks' noise over a spread of 0.35 and the root of the window
+    ("field_of_view").
 
     Parameters
     ----------
@@ -71,13 +72,14 @@ def register_cameras(
     window : int
         A moving camera is smoothed about as much as an average over so many frames would.
     weights : mapping, optional
-        What multiplies the squared terms "smooth", "roll", "ground" and "field_of_view"; 1 each by default, no unit.
+        What multiplies the squared terms "smooth", "roll", "ground" and "field_of_view", 1 each by default, and
+        "level", 0 by default: 0.3 keeps a figure with short legs from being taken for one seen from above.
     ground : float, optional
         Height of the floor in metres, above which the camera stands; None lets it stand anywhere.
     root : {"travel", "in_place", "auto"} or float
         Whether the figure moves on as in the clip, is drawn on the spot (the clip's smooth horizontal travel taken
         out), or how large a share of the travel it keeps; "auto" looks for the share with which a still camera explains
-        the drawings about as well as the camera that the whole travel needs.
+        the drawings, when the whole travel needs one that moves.
     cameras : camera, cameras or (3, 4) or (F, 3, 4) float, optional
         For ``mode="given"``.
     robust : bool

@@ -17,7 +17,7 @@ from pegbar.scene.camera import PerspectiveCamera
 
 Floats = NDArray[np.float64]
 #: Multiply the squared terms; 1 is as `register_cameras` describes them, 0 leaves a term out.
-WEIGHTS = {"smooth": 1.0, "roll": 1.0, "ground": 1.0, "field_of_view": 1.0}
+WEIGHTS = {"smooth": 1.0, "roll": 1.0, "level": 0.0, "ground": 1.0, "field_of_view": 1.0}
 #: The usual lens of a shot.
 USUAL_FIELD_OF_VIEW = math.radians(40)
 #: Marks that a frame's own camera needs.

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
@@ -65,7 +63,7 @@ def retime(motion: Motion, times: ArrayLike, *, frame_rate: float, root_smoothin
         rotations = motion.rotations[np.where(share < 0.5, before, after)]
     if smoothing:
         positions = positions + _steadier(positions, motion.parents, smoothing * rate)
-    return dataclasses.replace(motion, positions=positions, rotations=rotations, frame_rate=rate, rest_frame=None)
+    return motion.changed(positions=positions, rotations=rotations, frame_rate=rate, rest_frame=None)
 
 
 def sample_markers(markers: ArrayLike, times: ArrayLike, *, rest_frame: int | None = None) -> Floats:

@@ -1,8 +1,8 @@
 """Which side is which: exchanged marks, mirrored motions, mirrored pictures.
 
 Parallel rays cannot tell a figure from its reflection in the picture plane: the view from (azimuth, elevation) is the
-mirror image of the view from (azimuth + 180, -elevation). So of the four ways in which a drawing and a clip may differ in
-left and right two and two look alike:
+mirror image of the view from (azimuth + 180, -elevation). So of the four ways in which a drawing and a clip may differ
+in left and right two and two look alike:
 
 * the clip as it is, or: picture mirrored after it was marked (the clip's mirror image, marks exchanged);
 * marks exchanged, or: the mirror image of the clip.
@@ -26,6 +26,8 @@ _LEFT = [index for index, name in enumerate(MARKERS) if name.startswith("left_")
 _RIGHT = [MARKERS.index(MARKERS[index].replace("left_", "right_")) for index in _LEFT]
 # Metres by which two markers must differ in depth to say something, how often, and how clearly.
 _APART, _VOTES, _CLEAR = 0.05, 4, 0.6
+# Eighths of a turn to the person's left.
+_SEEN_FROM = ("front", "front left", "left", "back left", "back", "back right", "right", "front right")
 
 
 class Sides(NamedTuple):
@@ -57,9 +59,7 @@ def mirror(markers: Floats) -> Floats:
     return reflected
 
 
-def tell_sides(
-    markers: Floats, azimuth: float, elevation: float, exchanged: bool, visible: NDArray[np.bool_]
-) -> Sides:
+def tell_sides(markers: Floats, azimuth: float, elevation: float, exchanged: bool, visible: NDArray[np.bool_]) -> Sides:
     """Return which of the two ways that look alike it is.
 
     ``markers`` (F, 16, 3) are the clip's where each drawing has it, ``visible`` (F, 16) the drawing's canonical marks
@@ -76,3 +76,12 @@ def tell_sides(
     if not reflected:
         return Sides(azimuth, elevation, False, exchanged, told)
     return Sides((180 - azimuth) % 360, -elevation, True, not exchanged, told)
+
+
+def seen_from(markers: Floats, azimuth: float) -> str:
+    """The side of a person, ``markers`` (F, 16, 3), that a camera at ``azimuth`` degrees sees."""
+    across = markers[:, _LEFT].mean(axis=1) - markers[:, _RIGHT].mean(axis=1)
+    # Facing is left hand cross up, in the horizontal plane; the mean over the frames keeps a turn's middle.
+    facing = np.nansum(np.stack([across[:, 2] * -1, across[:, 0]], axis=1), axis=0)
+    relative = azimuth - np.degrees(np.arctan2(facing[0], facing[1]))
+    return _SEEN_FROM[round(relative / 45) % 8]

@@ -29,7 +29,7 @@ def align(
     shot
         The shot file.
     """
-    stage = AlignStage(open_shot(shot), overwrite)
+    stage = AlignStage(open_shot(shot, aligned=False), overwrite)
     with progress("align", len(stage.numbers)) as advance:
         alignment, made = stage.run(lambda _done, _all: advance())
     for note in alignment.notes:

@@ -59,6 +59,12 @@ back-projects the marks. Writes overlays to look at, a warp plot, errors, and ma
 pegbar depth and composite then use.
 
 Example: pegbar align my_shot/shot.toml""",
+    "lift": """Make a 3D animation of a drawn sequence, with the artist's poses and timing.
+
+Aligns the shot first where that is out of date. Writes the clip's skeleton posed as drawn (BVH, glTF, USD), the 3D
+markers (CSV, npz), a sheet to look at and a report.
+
+Example: pegbar lift my_shot/shot.toml""",
     "motion": """Look at motion capture clips.""",
     "demo": """Make a sample shot from nothing and run every stage on it.
 
@@ -67,7 +73,11 @@ A drawn dancer with a hoop and a ribbon.
 Example: pegbar demo demo""",
     "reproduce": """Repeat an experiment of the papers on clips that you have.
 
+jain2009-table1: a walk drawn by a known camera and lifted to 3D with another walk.
+
 jain2010-fig9: how wrong a walk's depth is when it comes from other clips.
+
+foot-contact: how much better feet and knees are placed when standing feet take their depth from the floor.
 
 Tables are printed and written as CSV, plots as PNG.
 

@@ -9,19 +9,17 @@ from typing import Annotated
 
 import numpy as np
 from cyclopts import Parameter
-
 from numpy.typing import NDArray
 
 from pegbar.align.match import Matches, match_clips
 from pegbar.errors import describe
 from pegbar.io.annotations import read_annotations
 from pegbar.io.clip_folder import ClipFolder, read_clips
-from pegbar.io.frames import read_picture, write_image
 from pegbar.io.numbers import format_frames, parse_frames
-from pegbar.report.match_sheet import SheetRow, match_sheet
 from pegbar.report.match_table import describe_match, report_left_out, report_matches
 from pegbar.scene.body import MARKERS
 from pegbar.scene.drawing import Drawing
+from pegbar.shot.clip import clip_text, write_clip
 
 # Drawings and matches on the contact sheet.
 _KEYS, _ROWS = 6, 8
@@ -60,12 +58,9 @@ def match(
         return 1
     found = _search(drawing, chosen, folder, frame_rate, top)
     report_left_out(folder.broken, {**folder.skipped, **found.skipped})
-    report_matches(folder, found)
+    report_matches(folder, found, (chosen + 1).tolist())
     if output is not None and found.matches:
-        target = output / "match.png"
-        output.mkdir(parents=True, exist_ok=True)
-        write_image(target, _sheet(drawing, chosen, folder, found))
-        print(f"match: wrote {target}")
+        _write_sheet(output, drawing, chosen, folder, found)
     _write_choice(write, clips, found)
     return 0
 
@@ -108,7 +103,11 @@ def _search(
     )
 
 
-def _sheet(drawing: Drawing, chosen: NDArray[np.intp], folder: ClipFolder, found: Matches) -> NDArray[np.uint8]:
+def _write_sheet(output: Path, drawing: Drawing, chosen: NDArray[np.intp], folder: ClipFolder, found: Matches) -> None:
+    # Pictures take long to import, and the table does without.
+    from pegbar.io.frames import write_image
+    from pegbar.report.match_sheet import SheetRow, match_sheet
+
     keys = np.unique(np.linspace(0, len(chosen) - 1, min(len(chosen), _KEYS)).round().astype(int))
     marks = np.full((len(keys), len(MARKERS), 2), np.nan)
     for place, name in enumerate(drawing.names):
@@ -121,11 +120,16 @@ def _sheet(drawing: Drawing, chosen: NDArray[np.intp], folder: ClipFolder, found
         captions = tuple(f"frame {match.times[key]:.1f}" for key in keys)
         rows.append(SheetRow(describe_match(rank, match, clips[match.clip]), points, captions))
     titles = [f"drawing {number}" for number in chosen[keys] + 1]
-    return match_sheet(marks, titles, [_picture(drawing, number) for number in chosen[keys]], rows)
+    sheet = match_sheet(marks, titles, [_picture(drawing, number) for number in chosen[keys]], rows)
+    output.mkdir(parents=True, exist_ok=True)
+    write_image(output / "match.png", sheet)
+    print(f"match: wrote {output / 'match.png'}")
 
 
 def _picture(drawing: Drawing, number: int) -> NDArray[np.uint8] | None:
     """The drawing's picture where there is one to be read; the sheet does without."""
+    from pegbar.io.frames import read_picture
+
     try:
         return read_picture(drawing.images[number]) if drawing.images else None
     except (OSError, ValueError) as error:
@@ -139,20 +143,16 @@ def _write_choice(shot: Path | None, clips: Path, found: Matches) -> None:
         if shot is not None:
             print(f"match: {shot} is left as it is")
         return
-    # The models of the shot file take long to import.
-    from pegbar.shot.clip import clip_text, write_clip
-    from pegbar.shot.model import ClipSection
-
     best, folder = found.matches[0], shot.parent if shot is not None else Path()
-    section = ClipSection(
-        path=Path(os.path.relpath(clips / best.clip, folder)).as_posix(),
-        start=best.start,
-        stop=best.stop,
-        azimuth=round(best.azimuth, 1),
-        elevation=round(best.elevation, 1),
-        mirrored=best.mirrored,
-        swapped=best.swapped,
-    )
+    section = {
+        "path": Path(os.path.relpath(clips / best.clip, folder)).as_posix(),
+        "start": best.start,
+        "stop": best.stop,
+        "azimuth": round(best.azimuth, 1),
+        "elevation": round(best.elevation, 1),
+        "mirrored": best.mirrored,
+        "swapped": best.swapped,
+    }
     if shot is None:
         print(f"\nFor the shot file:\n\n{clip_text(section)}", end="")
         return

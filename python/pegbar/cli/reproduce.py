@@ -10,7 +10,11 @@ from cyclopts import Parameter
 
 #: Where each experiment is: a function of the folder with clips and the folder to write to, which returns the lines to
 #: print.
-EXPERIMENTS: dict[str, str] = {"jain2010-fig9": "pegbar.report.jain2010_figure9:reproduce"}
+EXPERIMENTS = {
+    "jain2009-table1": "pegbar.report.jain2009_table1:reproduce",
+    "jain2010-fig9": "pegbar.report.jain2010_figure9:reproduce",
+    "foot-contact": "pegbar.report.foot_contact:reproduce",
+}
 
 
 def reproduce(

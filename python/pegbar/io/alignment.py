@@ -18,22 +18,22 @@ _TEXTS = ("names", "notes")
 
 def write_alignment(path: str | os.PathLike[str], alignment: Alignment) -> None:
     """Write ``alignment`` as a .npz file whose arrays have its attributes' names, complete or not at all."""
-    values = {field.name: np.asarray(getattr(alignment, field.name)) for field in fields(alignment)}
-    texts = {name: np.asarray(getattr(alignment, name), dtype=np.str_) for name in _TEXTS}
+    values: dict[str, Any] = {field.name: np.asarray(getattr(alignment, field.name)) for field in fields(alignment)}
+    values |= {name: np.asarray(getattr(alignment, name), dtype=np.str_) for name in _TEXTS}
     with complete_file(path) as part, part.open("wb") as file:
-        np.savez_compressed(file, **{**values, **texts})
+        np.savez_compressed(file, **values)
 
 
 def read_alignment(path: str | os.PathLike[str]) -> Alignment:
     """Read what `write_alignment` wrote; FormatError for a file that is broken or something else."""
     try:
-        with np.load(path, allow_pickle=False) as file:
-            values: dict[str, Any] = {field.name: file[field.name] for field in fields(Alignment)}
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as held:
+            values: dict[str, Any] = {field.name: held[field.name] for field in fields(Alignment)}
     except (zipfile.BadZipFile, KeyError, ValueError, EOFError) as error:
         raise FormatError(path, f"no alignment: {error}") from None
     for name in _TEXTS:
         values[name] = tuple(values[name].tolist())
-    for name in ("mode", "root", "mirrored"):
+    for name in ("mode", "root", "clip_path", "mirrored", "swapped"):
         values[name] = values[name].item()
     width, height = values["image_size"].tolist()
     return Alignment(**{**values, "image_size": (width, height)})

@@ -12,11 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from pegbar import arrays
 from pegbar.io import atomic
+from pegbar.scene.conventions import UNITS
 from pegbar.scene.motion import Motion
 
 Floats = NDArray[np.float64]
-#: Metres in a unit of the file.
-UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254}
 
 
 def write_bvh(
@@ -38,7 +37,7 @@ def write_bvh(
         The file to make or replace.
     motion : Motion
         One skeleton: exactly one joint has the parent -1.
-    unit : float or {"cm", "m", "mm", "inch"}
+    unit : float or {"cm", "m", "mm", "inch", "foot", "cmu"}
         The unit of lengths in the file, by name or in metres.
     stretch : bool
         Joints whose offset changes by more than a tenth of a millimetre get position channels too, so that squash and

@@ -65,6 +65,15 @@ def read_clips(
         Where there is no such folder.
     FileNotFoundError
         For a folder without a clip.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> folder = Path(tempfile.mkdtemp())
+    >>> _ = (folder / "cut.bvh").write_text("HIERARCHY")
+    >>> found = read_clips(folder, use_index=False)
+    >>> found.clips, list(found.broken)
+    ((), ['cut.bvh'])
     """
     root = Path(folder)
     if not root.is_dir():
@@ -129,9 +138,7 @@ def _unchanged(root: Path, path: Path, entry: Entry) -> tuple[File, ...] | None:
     return tuple(now)
 
 
-def _read_all(
-    root: Path, paths: list[Path], progress: Callable[[int, int], None] | None
-) -> dict[str, Entry]:
+def _read_all(root: Path, paths: list[Path], progress: Callable[[int, int], None] | None) -> dict[str, Entry]:
     entries: dict[str, Entry] = {}
     with ThreadPoolExecutor(min(len(paths), os.cpu_count() or 1) or 1) as pool:
         for entry in pool.map(lambda path: _read(root, path), paths):

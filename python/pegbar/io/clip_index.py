@@ -1,8 +1,8 @@
 """The index of a folder of clips: one file with the markers of all of them.
 
-A line that says what it is, the length of the header and the hash of all that follows; the header in JSON: of every clip its
-files, rates and number of frames; then the markers as float32, clip after clip. An index that is broken, cut short, or
-written by another version is as good as none.
+A line that says what it is, the length of the header and the hash of all that follows; the header in JSON: of every
+clip its files, rates and number of frames; then the markers as float32, clip after clip. An index that is broken, cut
+short, or written by another version is as good as none.
 """
 
 from __future__ import annotations
@@ -69,11 +69,12 @@ def save_index(folder: Path, entries: list[Entry]) -> Path | None:
 
 
 def _places(folder: Path) -> list[Path]:
-    """In the folder, else in the user's cache."""
+    """In the folder, unless it is marked read-only (which does not stop everybody), else in the user's cache."""
     import xxhash
 
     unlike = xxhash.xxh3_64_hexdigest(os.fsencode(folder.resolve()))
-    return [folder / NAME, _cache() / "pegbar" / f"clips-{unlike}.index"]
+    own = [folder / NAME] if folder.stat().st_mode & 0o222 else []
+    return [*own, _cache() / "pegbar" / f"clips-{unlike}.index"]
 
 
 def _cache() -> Path:

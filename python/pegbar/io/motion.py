@@ -93,6 +93,7 @@ def read_motion(
     """
     metres = _unit(unit)
     if up is not None:
+        up = up.lower()
         up_rotation(up)
     if frame_rate is not None and not 0 < frame_rate < math.inf:
         raise ValueError(f"frame_rate: want frames a second above 0, got {frame_rate}")

@@ -111,7 +111,8 @@ def ground_depths(
     frames, feet, noise = len(marks), foot_places(names), noise or ContactNoise()
     matrices = arrays.floats("matrices", matrices, (frames, 3, 4))
     corrected = arrays.floats("depths", depths, (frames, len(names)), allow="nan").copy()
-    heights = floor + np.broadcast_to(arrays.floats("ankle_height", ankle_height, (...,)), 2)
+    rest = arrays.floats("ankle_height", ankle_height, (2,) if np.ndim(ankle_height) else ())
+    heights = float(arrays.floats("floor", floor, ())) + np.broadcast_to(rest, 2)
     if not (np.isfinite(frame_rate) and frame_rate > 0):
         raise ValueError(f"frame_rate: want a positive number, got {frame_rate}")
     met, spread = _floor_depths(marks[:, feet], matrices, heights, noise)

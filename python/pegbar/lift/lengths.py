@@ -30,7 +30,7 @@ def likely_lengths(drawn: Drawn, clip: Floats) -> Floats:
     nearer it is to the clip's proportions; it is no shorter than the limb is drawn, outliers apart.
     """
     planar, _, noise, _ = drawn
-    shortest = np.maximum(np.quantile(planar, 0.9, axis=1), planar.max(axis=1) - 4 * np.median(noise, axis=1))
+    shortest = np.maximum(np.median(planar, axis=1), planar.max(axis=1) - 4 * np.median(noise, axis=1))
     shortest = np.maximum(shortest, 1e-3 * np.maximum(clip, 1e-6))
     reach = np.maximum(np.log(np.maximum(REACH * clip, 1e-6) / shortest), BEYOND)
     # Quadratic steps: just above the longest drawn length little more length is much more depth.

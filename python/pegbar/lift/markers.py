@@ -8,15 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pegbar import _kernels, arrays
-from pegbar.errors import DegenerateError
-from pegbar.lift.lengths import clip_lengths, given_lengths
-from pegbar.lift.projection import frame_cameras, projection_rows
-from pegbar.lift.refine import Refinement, refine_markers
+from pegbar.lift.given import Given, Refinement, check_weights
+from pegbar.lift.lengths import clip_lengths
+from pegbar.lift.projection import projection_rows
+from pegbar.lift.refine import refine_markers
 from pegbar.lift.subspace import principal_components
 
 Floats = NDArray[np.float64]
-#: With fewer visible marks than this the rest of the figure is a guess from the clip alone.
-FEWEST_MARKS = 4
 
 
 def reconstruct_markers(
@@ -31,6 +29,12 @@ def reconstruct_markers(
     components: int = 20,
     training: ArrayLike | None = None,
     refine: bool = False,
+    planted: ArrayLike | None = None,
+    held: ArrayLike | None = None,
+    flips: ArrayLike = (),
+    stretch: bool = False,
+    noise: float | None = None,
+    root: int = 0,
 ) -> Floats:
     """Find the markers in space whose picture is the drawn pose and which stay near the clip's.
 
@@ -38,10 +42,14 @@ def reconstruct_markers(
     the squared error of squared limb lengths (eq. 7, linearised around the clip's pose) and ``prior_weight`` times the
     squared distance to the clip, all in metres, in closed form.
 
+    With ``refine`` limbs have exact lengths instead: length and drawn foreshortening give the size of a limb's depth,
+    smooth motion and the clip its sign, over the whole sequence at once. The weights and components above are not used.
+
     Parameters
     ----------
     aligned : (F, N, 2) float
-        The aligned markers (see `align_limbs`) in the picture's units; NaN where a marker is not visible.
+        The aligned markers (see `align_limbs`) in the picture's units; with ``refine`` the drawn markers themselves.
+        NaN where a marker is not visible.
     prior : (F, N, 3) float
         The time-aligned clip's markers in metres.
     camera : OrthographicCamera, PerspectiveCamera, a sequence of F of them, or an object with ``cameras``
@@ -49,13 +57,27 @@ def reconstruct_markers(
     limbs : (V, 2) int
         Pairs of markers that keep their distance.
     lengths : (V,) or (F, V) float, or None
-        Their lengths in metres; None estimates them (see `limb_lengths`).
+        Their lengths in metres. None: the clip's medians; with ``refine`` what `drawn_lengths` finds.
     limb_weight, prior_weight : float
         The paper's lambda 1 (dimension: 1 / metres squared) and lambda 2.
     components : int
         How many principal components of ``training`` poses are made of.
     training : (G, N, 3) float, optional
         Poses in the frame of reference of ``prior``; None leaves poses free (eq. 11).
+    refine : bool
+        Rigid limbs, signs chosen over time; what follows is for it alone.
+    planted : (F, N) bool, optional
+        Where a marker stands: it stays at one place through every run of frames.
+    held : (F, N, 3) float, optional
+        Where a marker is put, in metres; NaN where it is free.
+    flips : (K, 3) int
+        (limb, first frame, one past the last): limbs whose depth is turned the other way by hand.
+    stretch : bool
+        Keep the drawing's squash and stretch: the drawn points are met exactly and limbs change their lengths.
+    noise : float, optional
+        Deviation of the marks in the picture's units; None measures it. 0 follows them wherever lengths allow it.
+    root : int
+        The marker whose depth is the clip's; the others' depths hang on it.
 
     Returns
     -------
@@ -65,7 +87,8 @@ def reconstruct_markers(
     Raises
     ------
     ValueError
-        For a wrong shape, a number that is not finite, a weight below 0 or fewer than 2 training poses.
+        For a wrong shape, a number that is not finite, a weight below 0, fewer than 2 training poses, or an option of
+        ``refine`` without it.
     DegenerateError
         For a frame with fewer than 4 visible markers, or training poses that are all equal.
 
@@ -76,46 +99,77 @@ def reconstruct_markers(
     >>> front = OrthographicCamera.from_angles(0, 0)
     >>> reconstruct_markers([[[0, 0], [0.3, 0]]], clip, front, [(0, 1)], [0.5])[0, 1].round(2).tolist()
     [0.27, 0.03, 1.4]
+    >>> reconstruct_markers([[[0, 0], [0.3, 0]]], clip, front, [(0, 1)], [0.5], refine=True)[0, 1].round(2).tolist()
+    [0.3, 0.0, 1.4]
     """
-    prior = arrays.floats("prior", prior, ("F", "N", 3))
-    frames, markers = prior.shape[:2]
-    aligned = arrays.floats("aligned", aligned, (frames, markers, 2), allow="nan")
-    limbs = arrays.integers("limbs", limbs, ("V", 2), low=0, high=markers - 1)
-    cameras = frame_cameras(camera, frames)
+    given = Given.checked(aligned, prior, camera, limbs, lengths)
     check_weights(limb_weight=limb_weight, prior_weight=prior_weight)
-    check_marks(aligned)
-    given = None if lengths is None else given_lengths(lengths, frames, len(limbs))
-    if not frames:
-        return prior
+    subspace = _subspace(training, given, components)
+    options = Refinement.checked(given, planted, held, flips, stretch, noise, root)
     if refine:
-        return refine_markers(aligned, prior, cameras, limbs, given, Refinement())[0]
-    if given is None:
-        given = given_lengths(clip_lengths(prior, limbs), frames, len(limbs))
-    mean, basis = np.empty((0, 3)), np.empty((0, 3 * markers))
-    if training is not None:
-        poses = arrays.floats("training", training, ("G", markers, 3))
-        if components < 1:
-            raise ValueError(f"components: want at least 1, got {components}")
-        mean, basis = principal_components(poses, components)
-    rows = projection_rows(aligned, cameras)
+        return refine_markers(given, options)[0]
+    if planted is not None or held is not None or len(options.flips) or stretch or noise is not None:
+        raise ValueError("refine: planted, held, flips, stretch and noise are options of refine=True")
+    return _closed_form(given, float(limb_weight), float(prior_weight), subspace)
+
+
+def drawn_lengths(drawn: ArrayLike, prior: ArrayLike, camera: Any, limbs: ArrayLike) -> Floats:
+    """Find how long the limbs of a drawn figure are, from how they foreshorten over a sequence.
+
+    A limb that comes through the picture plane shows its length; for one that never does, the clip's proportions and
+    its turning decide. Every length is the one under which the depths, in the best choice of signs, are smoothest and
+    nearest to the clip.
+
+    Parameters
+    ----------
+    drawn : (F, N, 2) float
+        The drawn markers in the picture's units, NaN where not visible.
+    prior : (F, N, 3) float
+        The time-aligned clip's markers in metres.
+    camera, limbs
+        As in `reconstruct_markers`.
+
+    Returns
+    -------
+    (V,) float
+        Metres.
+
+    Raises
+    ------
+    ValueError, DegenerateError
+        As in `reconstruct_markers`.
+
+    Examples
+    --------
+    >>> from pegbar import OrthographicCamera
+    >>> angles = np.linspace(-1, 1, 30)
+    >>> turning = 0.4 * np.stack([np.cos(angles), 0 * angles, np.sin(angles)], axis=1)
+    >>> figure = np.stack([0 * turning, turning], axis=1)
+    >>> front = OrthographicCamera.from_angles(0, 0)
+    >>> drawn_lengths(front.project(figure), 1.1 * figure, front, [(0, 1)]).round(2).tolist()
+    [0.4]
+    """
+    given = Given.checked(drawn, prior, camera, limbs, None)
+    return refine_markers(given, Refinement())[1][0] if len(given.prior) else np.zeros(len(given.limbs))
+
+
+def _subspace(training: ArrayLike | None, given: Given, components: int) -> tuple[Floats, Floats]:
+    """Mean and components of ``training``; both empty without any."""
+    markers = given.prior.shape[1]
+    if training is None:
+        return np.empty((0, 3)), np.empty((0, 3 * markers))
+    if components < 1:
+        raise ValueError(f"components: want at least 1, got {components}")
+    return principal_components(arrays.floats("training", training, ("G", markers, 3)), components)
+
+
+def _closed_form(given: Given, limb_weight: float, prior_weight: float, subspace: tuple[Floats, Floats]) -> Floats:
+    if not len(given.prior):
+        return given.prior
+    lengths = given.lengths
+    if lengths is None:
+        lengths = np.tile(clip_lengths(given.prior, given.limbs), (len(given.prior), 1))
+    rows = projection_rows(given.drawn, given.cameras)
     # Where drawing and limbs leave a direction open the clip's stays: the limit of a weight that goes to 0.
-    weights = (float(limb_weight), max(float(prior_weight), 1e-9))
-    return _kernels.lift_markers(rows, limbs, given, prior, weights, (mean, basis))
-
-
-def check_weights(**weights: float) -> None:
-    """Refuse a weight that is negative or not finite, by its name."""
-    for name, value in weights.items():
-        if not (np.isfinite(value) and value >= 0):
-            raise ValueError(f"{name}: want a finite number of at least 0, got {value}")
-
-
-def check_marks(points: Floats) -> None:
-    """Refuse a frame of (F, N, 2) ``points`` in which fewer than four are not NaN (or all, of fewer markers)."""
-    visible = (~np.isnan(points).any(axis=-1)).sum(axis=1)
-    wanted = min(FEWEST_MARKS, points.shape[1])
-    if (visible < wanted).any():
-        frame = int(np.argmax(visible < wanted))
-        raise DegenerateError(
-            f"frame {frame}: {visible[frame]} visible markers, want at least {wanted} to place the figure"
-        )
+    weights = (limb_weight, max(prior_weight, 1e-9))
+    return _kernels.lift_markers(rows, given.limbs, lengths, given.prior, weights, subspace)

@@ -15,6 +15,11 @@ Floats = NDArray[np.float64]
 Camera = PerspectiveCamera | OrthographicCamera
 
 
+def known(points: Floats) -> NDArray[np.bool_]:
+    """Return where all coordinates of ``points`` (..., K) are finite (...)."""
+    return np.asarray(np.isfinite(points).all(axis=-1))
+
+
 def frame_cameras(camera: Any, frames: int) -> tuple[Camera, ...]:
     """Return one camera a frame: ``camera`` itself, a sequence of cameras, or an object with ``cameras``.
 
@@ -42,7 +47,7 @@ def projection_rows(points: Floats, cameras: Sequence[Camera]) -> Floats:
     shared = len(set(map(id, cameras))) == 1
     for part, camera in [(slice(None), cameras[0])] if shared else enumerate(cameras):
         rows[part] = _camera_rows(points[part], camera)
-    rows[np.isnan(points).any(axis=-1)] = 0
+    rows[~known(points)] = 0
     return rows
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 
-from pegbar.lift.projection import Camera
+from pegbar.lift.projection import Camera, known
 from pegbar.scene.orthographic import OrthographicCamera
 
 Floats = NDArray[np.float64]
@@ -78,16 +78,18 @@ def fill_marks(points: Floats, picture: Floats) -> Floats:
     takes the visible ones' mean offset.
     """
     offset = points - picture
-    seen = np.isfinite(offset).all(axis=-1)
+    seen = known(offset)
     frames = np.arange(len(points))
     with_others = np.nansum(offset, axis=1) / np.maximum(seen.sum(axis=1), 1)[:, None]
     for marker in np.flatnonzero(~seen.all(axis=0)):
-        known = seen[:, marker]
+        visible = seen[:, marker]
         for axis in range(2):
             between = (
-                np.interp(frames, frames[known], offset[known, marker, axis]) if known.any() else with_others[:, axis]
+                np.interp(frames, frames[visible], offset[visible, marker, axis])
+                if visible.any()
+                else with_others[:, axis]
             )
-            offset[~known, marker, axis] = between[~known]
+            offset[~visible, marker, axis] = between[~visible]
     filled: Floats = np.where(seen[..., None], points, picture + offset)
     return filled
 

@@ -6,18 +6,21 @@ of a limb's depth (Taylor 2000), and clip and smooth motion together its sign.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pegbar import _kernels
-from pegbar.lift.lengths import likely_lengths
-from pegbar.lift.projection import Camera
+from pegbar.lift.given import Given, Refinement
+from pegbar.lift.lengths import Drawn, clip_lengths, likely_lengths
+from pegbar.lift.pins import meet_lengths, planted_targets
+from pegbar.lift.projection import known
+from pegbar.lift.proportions import drawn_proportions, weighted_median
 from pegbar.lift.rays import fill_marks, mark_noise, metres_per_unit, project, sight_rays, smooth_marks
 from pegbar.lift.rigid import LimbTracks, rigid_limbs
-from pegbar.lift.tree import Link, limb_tree
+from pegbar.scene.limb_tree import Link, limb_tree
 
 Floats = NDArray[np.float64]
 #: Natural motion at usual frame rates looks like noise of this part of all limbs' length together.
@@ -34,14 +37,10 @@ DOUBT = 2.0
 LOOSER = 2.0
 
 
-@dataclass(frozen=True)
-class Refinement:
-    """What `refine_markers` may be told: see `reconstruct_markers`."""
-
-    noise: float | None = None
-    root: int = 0
-    flips: NDArray[np.int64] | None = None
-    stretch: bool = False
+#: Drawn lengths change this much (relative) over time because poses differ from the clip's.
+POSE = 0.03
+#: Metres.
+NO_LENGTH = 1e-4
 
 
 @dataclass
@@ -53,55 +52,83 @@ class _Figure:
     smooth: tuple[Floats, Floats]
     marked: tuple[Floats, Floats]
     noise: Floats
-    scale: float
+    scales: Floats
+    stretch: float
+    change: float
 
 
-def refine_markers(
-    drawn: Floats,
-    prior: Floats,
-    cameras: Sequence[Camera],
-    limbs: NDArray[np.int64],
-    lengths: Floats | None,
-    options: Refinement,
-) -> tuple[Floats, Floats]:
+def refine_markers(given: Given, options: Refinement) -> tuple[Floats, Floats]:
     """Return the markers (F, N, 3) and the limbs' lengths (F, V), in metres; arguments as in `reconstruct_markers`."""
+    drawn, prior, limbs, lengths = given.drawn, given.prior, given.limbs, given.lengths
+    if not len(prior):
+        return prior, np.zeros((0, len(limbs)))
     levels = limb_tree(limbs, prior, options.root)
-    figure = _start(drawn, prior, cameras, [link for level in levels for link in level], lengths, options)
-    solved = np.zeros((len(drawn), len(limbs))) if lengths is None else lengths
-    for level in levels:
-        found = _solve_level(figure, level, lengths, options)
-        for (_, _, limb), length in zip(level, found, strict=True):
-            if limb >= 0:
-                solved[:, limb] = length
+    links = [link for level in levels for link in level]
+    figure = _start(given, links, options)
+    rows = [_solve_level(figure, level, lengths, options) for level in levels]
+    linked = np.concatenate([np.zeros((0, len(drawn))), *rows])
+    ends = np.array([link[:2] for link in links], dtype=np.int64).reshape(-1, 2)
+    solved = _all_lengths(figure, limbs, links, linked, lengths)
+    rings = sorted(set(range(len(limbs))) - {limb for _, _, limb in links})
+    targets = np.full(figure.points.shape, np.nan)
+    if options.planted is not None or options.held is not None:
+        planted = np.zeros(drawn.shape[:2], bool) if options.planted is None else options.planted
+        targets = planted_targets(figure.points, planted, options.held)
     if options.stretch:
-        figure.points = _onto_rays(figure.points, figure.marked)
+        return np.where(np.isfinite(targets), targets, figure.points), solved
+    moved = slice(None) if rings else np.flatnonzero(known(targets).any(axis=1))
+    ends, linked = np.concatenate([ends, limbs[rings]]), np.concatenate([linked, solved[:, rings].T])
+    rays, spans = figure.smooth[1][moved], linked.T[moved]
+    figure.points[moved] = meet_lengths(figure.points[moved], rays, ends, spans, targets[moved])
     return figure.points, solved
 
 
-def _start(
-    drawn: Floats,
-    prior: Floats,
-    cameras: Sequence[Camera],
-    links: list[Link],
-    lengths: Floats | None,
-    options: Refinement,
-) -> _Figure:
+def _all_lengths(
+    figure: _Figure, limbs: NDArray[np.int64], links: list[Link], linked: Floats, lengths: Floats | None
+) -> Floats:
+    """The lengths (F, V) of all limbs: given, found along the tree's links, or (limbs that close rings) the clip's."""
+    if lengths is not None:
+        return lengths
+    frames = len(figure.points)
+    solved = np.tile(np.median(figure.scales) * clip_lengths(figure.prior, limbs), (frames, 1))
+    for (_, _, limb), length in zip(links, linked, strict=True):
+        if limb >= 0:
+            solved[:, limb] = length
+    return solved
+
+
+def _start(given: Given, links: list[Link], options: Refinement) -> _Figure:
+    drawn, prior, cameras, lengths = given.drawn, given.prior, given.cameras, given.lengths
     picture, unit = project(prior, cameras), float(np.mean(metres_per_unit(prior, cameras)))
     ends = np.array([link[:2] for link in links], dtype=np.int64).reshape(-1, 2)
     size = float(np.linalg.norm(prior[:, ends[:, 0]] - prior[:, ends[:, 1]], axis=-1).mean(axis=0).sum())
     deviation = mark_noise(drawn * unit, NATURAL_NOISE * size) if options.noise is None else options.noise * unit
     filled = fill_marks(drawn, picture)
-    noise = np.where(np.isfinite(drawn).all(axis=-1), deviation, HIDDEN_NOISE * size + deviation)
+    noise = np.where(known(drawn), deviation, HIDDEN_NOISE * size + deviation)
     jolts = np.median(np.abs(np.diff(picture, 2, axis=0)), axis=(0, 2)) + 1e-3 / unit if len(drawn) > 2 else 1.0
     smooth = sight_rays(smooth_marks(filled, noise / unit, np.broadcast_to(jolts, noise.shape[1:])), cameras)
     points = _onto_rays(prior, smooth)
-    scale = _scale(points, prior, smooth[1], ends)
+    scales = np.ones(drawn.shape[1])
+    drawn_as = drawn_proportions(points, prior, smooth[1], ends)
+    scales[ends[:, 1]] = drawn_as.scales
     if lengths is not None:
-        whole = [link for link in links if link[2] >= 0]
-        spans = np.linalg.norm([prior[:, a] - prior[:, b] for a, b, _ in whole], axis=-1)
-        given = lengths[:, [limb for _, _, limb in whole]]
-        scale = float(given.sum() / spans.sum()) if spans.sum() > 0 and given.sum() > 0 else scale
-    return _Figure(points, prior, smooth, sight_rays(filled, cameras), noise, scale)
+        scales[ends[:, 1]] = _told_scales(scales[ends[:, 1]], prior, links, lengths)
+    # Rigid limbs of lengths that are told do not change; of lengths to be found, only as far as poses do not explain.
+    stretch = drawn_as.stretch
+    change = stretch if options.stretch else 0.0 if lengths is not None else math.sqrt(max(stretch**2 - POSE**2, 0))
+    return _Figure(points, prior, smooth, sight_rays(filled, cameras), noise, scales, stretch, change)
+
+
+def _told_scales(scales: Floats, prior: Floats, links: list[Link], lengths: Floats) -> Floats:
+    """The links' scales where lengths are told: theirs, and their median for links without."""
+    spans = np.median([np.linalg.norm(prior[:, a] - prior[:, b], axis=-1) for a, b, _ in links], axis=1)
+    limbs = np.array([limb for _, _, limb in links])
+    told = np.where(limbs >= 0, np.median(lengths, axis=0)[limbs], 0.0)
+    both = (told > NO_LENGTH) & (spans > NO_LENGTH)
+    if not both.any():
+        return scales
+    ratios = told / np.where(both, spans, 1)
+    return np.where(both, ratios, weighted_median(ratios[both], spans[both]))
 
 
 def _onto_rays(points: Floats, rays: tuple[Floats, Floats]) -> Floats:
@@ -111,47 +138,71 @@ def _onto_rays(points: Floats, rays: tuple[Floats, Floats]) -> Floats:
     return nearest
 
 
-def _scale(points: Floats, prior: Floats, directions: Floats, ends: NDArray[np.int64]) -> float:
-    """How much larger the drawn figure is than the clip's, from its limbs across the view."""
-    first, second = ends.T
-    away = directions[:, second]
+@dataclass(frozen=True)
+class _Level:
+    """Limbs that hang equally far from the root, and what the drawings and the clip say of them.
 
-    def across(markers: Floats) -> float:
-        limbs = markers[:, second] - markers[:, first]
-        return float(np.sum(np.square(limbs - np.sum(limbs * away, axis=-1, keepdims=True) * away)))
+    ``drawn`` as in `likely_lengths`; ``limbs`` (F, V, 3) and ``spans`` (V,) are the clip's, as large as they are drawn.
+    """
 
-    return float(np.sqrt(across(points) / max(across(prior), 1e-12))) or 1.0
+    links: list[Link]
+    parents: NDArray[np.int64]
+    children: NDArray[np.int64]
+    limbs: Floats
+    spans: Floats
+    drawn: Drawn
 
 
-def _solve_level(figure: _Figure, level: list[Link], lengths: Floats | None, options: Refinement) -> Floats:
-    """Place the markers at the ends of ``level``'s links; returns the links' lengths (links, F)."""
-    parents, children = np.array([link[:2] for link in level]).T
-    starts, rays = (side[:, children] for side in figure.smooth)
-    clip_limbs = figure.scale * (figure.prior[:, children] - figure.prior[:, parents])
-    spans = np.median(np.linalg.norm(clip_limbs, axis=-1), axis=0)
-    before = _onto_rays(figure.points[:, parents], tuple(side[:, parents] for side in figure.smooth))
-    across = _onto_rays(before, (starts, rays)) - before
-    clip = np.sum(clip_limbs * rays, axis=-1)
-    off = across - (clip_limbs - clip[..., None] * rays)
+def _observed(figure: _Figure, links: list[Link]) -> _Level:
+    parents, children = np.array([link[:2] for link in links], dtype=np.int64).T
+    limbs = figure.scales[children, None] * (figure.prior[:, children] - figure.prior[:, parents])
+    spans = np.median(np.linalg.norm(limbs, axis=-1), axis=0)
+    before = _onto_rays(figure.points[:, parents], _of(figure.smooth, parents))
+    across = _onto_rays(before, _of(figure.smooth, children)) - before
+    rays = figure.smooth[1][:, children]
+    clip = np.sum(limbs * rays, axis=-1)
+    off = across - (limbs - clip[..., None] * rays)
     doubts = DOUBT * (np.sqrt(np.mean(np.sum(off**2, axis=-1), axis=0) / 2) + LEAST_DOUBT * spans + 1e-9)
     noise = SMOOTHED * np.hypot(figure.noise[:, parents], figure.noise[:, children])
+    noise = np.hypot(noise, figure.change * spans)
     scales = np.column_stack([_jolts(clip[..., None]) + LEAST_JOLT * spans + 1e-9, doubts])
-    planar = np.linalg.norm(across, axis=-1)
-    drawn = (*(np.ascontiguousarray(values.T) for values in (planar, clip, noise)), scales)
-    found = _level_lengths(level, lengths, drawn, spans)
-    depths = _flipped(_kernels.limb_depths(drawn, found), level, options.flips)
-    starts, rays = (side[:, children] for side in figure.marked)
-    here = figure.points[:, parents]
+    planar, clip, noise = (np.ascontiguousarray(rows.T) for rows in (np.linalg.norm(across, axis=-1), clip, noise))
+    return _Level(links, parents, children, limbs, spans, (planar, clip, noise, scales))
+
+
+def _solve_level(figure: _Figure, links: list[Link], lengths: Floats | None, options: Refinement) -> Floats:
+    """Place the markers at the ends of ``links``; returns the links' lengths (links, F)."""
+    level = _observed(figure, links)
+    found = _level_lengths(level, lengths)
+    depths = _flipped(_kernels.limb_depths(level.drawn, found), links, options.flips)
+    here, marked = figure.points[:, level.parents], _of(figure.marked, level.children)
+    if options.stretch:
+        soft = _soft_depths(level, depths, found, figure.stretch).T
+        figure.points[:, level.children] = _onto_rays(here, marked) + soft[..., None] * marked[1]
+        return found
     tracks = LimbTracks(
-        (_onto_rays(here, (starts, rays)) - here).swapaxes(0, 1),
-        rays.swapaxes(0, 1),
-        np.clip(drawn[1], -found, found),
-        figure.noise[:, children].T,
-        LOOSER * (_jolts(clip_limbs) / np.sqrt(3) + LEAST_JOLT * spans + 1e-9),
-        2 * doubts,
+        across=(_onto_rays(here, marked) - here).swapaxes(0, 1),
+        rays=marked[1].swapaxes(0, 1),
+        clip=np.clip(level.drawn[1], -found, found),
+        noise=figure.noise[:, level.children].T,
+        jolts=LOOSER * (_jolts(level.limbs) / np.sqrt(3) + LEAST_JOLT * level.spans + 1e-9),
+        doubts=DOUBT * level.drawn[3][:, 1],
     )
-    figure.points[:, children] = here + rigid_limbs(tracks, depths, found).swapaxes(0, 1)
+    figure.points[:, level.children] = here + rigid_limbs(tracks, depths, found).swapaxes(0, 1)
     return found
+
+
+def _soft_depths(level: _Level, depths: Floats, lengths: Floats, stretch: float) -> Floats:
+    """The ``depths`` (V, F) that ``lengths`` ask for and the clip's, each as far as it is sure where limbs stretch."""
+    change = np.maximum(stretch * lengths, 1e-9)
+    told = (change * lengths) ** 2 / np.maximum(np.maximum(depths**2, 2 * change * lengths), 1e-12)
+    clip = (level.drawn[3][:, 1:] / DOUBT) ** 2
+    soft: Floats = (clip * depths + told * level.drawn[1]) / (clip + told)
+    return soft
+
+
+def _of(rays: tuple[Floats, Floats], markers: NDArray[np.int64]) -> tuple[Floats, Floats]:
+    return rays[0][:, markers], rays[1][:, markers]
 
 
 def _jolts(tracks: Floats) -> Floats:
@@ -162,23 +213,25 @@ def _jolts(tracks: Floats) -> Floats:
     return jolts
 
 
-def _level_lengths(level: list[Link], lengths: Floats | None, drawn: tuple[Floats, ...], spans: Floats) -> Floats:
-    """The lengths (links, F), given or as the drawings say; a link of no length in the clip has none."""
-    planar, clip, noise, scales = drawn
-    found = np.empty_like(planar)
-    unknown = np.array([lengths is None or limb < 0 for _, _, limb in level])
-    if unknown.any():
-        part = (planar[unknown], clip[unknown], noise[unknown], scales[unknown])
-        found[unknown] = np.where(spans[unknown] > 1e-6, likely_lengths(part, spans[unknown]), 0.0)[:, None]
-    for row in np.flatnonzero(~unknown):
-        found[row] = lengths[:, level[row][2]]
+def _level_lengths(level: _Level, lengths: Floats | None) -> Floats:
+    """The lengths (links, F), given or as the drawings say; a link without length in clip and drawings has none."""
+    found = np.empty_like(level.drawn[0])
+    told = np.array([lengths is not None and limb >= 0 for _, _, limb in level.links])
+    if not told.all():
+        planar, clip, noise, scales = (rows[~told] for rows in level.drawn)
+        spans = level.spans[~told]
+        seen = np.sqrt(np.mean(planar**2, axis=1)) > 3 * np.median(noise, axis=1) + NO_LENGTH
+        likely = likely_lengths((planar, clip, noise, scales), spans)
+        found[~told] = np.where(seen | (spans > NO_LENGTH), likely, 0.0)[:, None]
+    if lengths is not None:
+        found[told] = lengths[:, [limb for _, _, limb in level.links if limb >= 0]].T
     return found
 
 
-def _flipped(depths: Floats, level: list[Link], flips: NDArray[np.int64] | None) -> Floats:
+def _flipped(depths: Floats, links: list[Link], flips: NDArray[np.int64]) -> Floats:
     """``depths`` (links, F) with the signs turned that ``flips`` (limb, first frame, one past the last) name."""
-    for limb, start, stop in flips if flips is not None else ():
-        for row, link in enumerate(level):
+    for limb, start, stop in flips:
+        for row, link in enumerate(links):
             if link[2] == limb:
                 depths[row, start:stop] *= -1
     return depths

@@ -14,6 +14,8 @@ Floats = NDArray[np.float64]
 ROUNDS = 6
 #: The length is held this much tighter than the marks while iterating; at the end it is exact.
 TIGHTER = 5.0
+#: Metres: marks are followed no tighter than this while others are noisy.
+LEAST_NOISE = 2e-4
 
 
 @dataclass(frozen=True)
@@ -42,8 +44,9 @@ def rigid_limbs(tracks: LimbTracks, depths: Floats, lengths: Floats) -> Floats:
     limbs = _of_length(tracks.across + depths[..., None] * tracks.rays, lengths)
     if not tracks.noise.any() or limbs.shape[1] < 3:
         return limbs
+    noise = np.maximum(tracks.noise, LEAST_NOISE)
     along = tracks.rays[..., :, None] * tracks.rays[..., None, :]
-    sure, hold = 1 / tracks.noise**2, (TIGHTER / tracks.noise) ** 2
+    sure, hold = 1 / noise**2, (TIGHTER / noise) ** 2
     weak = 1 / tracks.doubts[:, None] ** 2
     fixed = sure[..., None, None] * (np.eye(3) - along) + weak[..., None, None] * along
     target = sure[..., None] * tracks.across + (weak * tracks.clip)[..., None] * tracks.rays

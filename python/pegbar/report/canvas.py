@@ -99,13 +99,16 @@ class Canvas:
         place = arrays.floats("xy", xy, (2,))
         letters = string.encode("ascii", "replace").decode()
         red, green, blue, alpha = _rgba("color", color)
-        mask = np.zeros(self._pixels.shape[:2], np.uint8)
-        corner = (round(float(place[0])), round(float(place[1])))
-        thickness = max(1, round(size / 9))
         # Hershey capitals are 21 units high at scale 1 in this face.
-        cv2.putText(mask, letters, corner, cv2.FONT_HERSHEY_SIMPLEX, size / 21, 255, thickness, cv2.LINE_AA)
+        scale, thickness = size / 21, max(1, round(size / 9))
+        (width, height), below = cv2.getTextSize(letters, cv2.FONT_HERSHEY_SIMPLEX, scale, thickness)
+        x, y, rim = round(float(place[0])), round(float(place[1])), thickness + 1
+        left, top = max(x - rim, 0), max(y - height - rim, 0)
+        target = self._pixels[top : max(y + below + rim, 0), left : max(x + width + rim, 0)]
+        mask = np.zeros(target.shape[:2], np.uint8)
+        cv2.putText(mask, letters, (x - left, y - top), cv2.FONT_HERSHEY_SIMPLEX, scale, 255, thickness, cv2.LINE_AA)
         cover = (mask[..., None].astype(np.uint16) * alpha + 127) // 255
-        _over(np.array([red, green, blue], np.uint16), cover, self._pixels)
+        _over(np.array([red, green, blue], np.uint16), cover, target)
 
     def image(self) -> NDArray[np.uint8]:
         """Return the picture (H, W, 4) uint8 with straight alpha; transparent pixels are all zero."""

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pegbar.align.descriptor import pose_descriptor, pose_distance
 from pegbar.align.registration import register_cameras
 from pegbar.align.timewarp import time_warp
+from pegbar.report.clips import moving_markers, person_height
 from pegbar.scene.body import LIMBS, MARKERS
 from pegbar.scene.camera import PerspectiveCamera
 from pegbar.scene.gait import facing
@@ -57,7 +58,7 @@ AZIMUTHS = {"side": 90.0, "three-quarter": 45.0}
 #: The camera that draws the walk where cameras are registered: metres from the middle of the walk, picture, lens.
 DISTANCE, IMAGE_SIZE, FIELD_OF_VIEW, ELEVATION = 6.0, (1280, 720), math.radians(45), math.radians(5)
 #: Arms and legs: the limbs whose angles are compared.
-_LIMBS = np.array([(MARKERS.index(limb.start), MARKERS.index(limb.end)) for limb in LIMBS if "_" in limb.name])
+LIMB_PAIRS = np.array([(MARKERS.index(limb.start), MARKERS.index(limb.end)) for limb in LIMBS if "_" in limb.name])
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,8 @@ def figure9(motions: Mapping[str, Motion], *, registered: bool = True) -> Result
     walker's height, turned once to face as the walk does at its start, and moved to its pelvis in every frame (the
     paper's experiment as far as it is told). "..., whole" turns the clips by their mean facing instead. "...,
     registered" sees the travelling walk through a perspective camera 6 m away and finds the camera of the warped clip
-    with `register_cameras` (free); errors are then relative to the pelvis. ``registered`` false leaves these out.
+    as `pegbar align` does (mode and root "auto"); errors are then relative to the pelvis. ``registered`` false leaves
+    these out.
 
     Raises
     ------
@@ -87,7 +89,7 @@ def figure9(motions: Mapping[str, Motion], *, registered: bool = True) -> Result
         For a clip that is missing.
     """
     truth = motions[TRUTH]
-    walk = _markers(truth, (None, None))
+    walk, height = _markers(truth, (None, None)), person_height(truth)
     errors: dict[str, dict[str, Floats]] = {}
     for view, azimuth in AZIMUTHS.items():
         ways: dict[str, Callable[[Floats], Floats]] = {
@@ -98,7 +100,9 @@ def figure9(motions: Mapping[str, Motion], *, registered: bool = True) -> Result
             ways[f"{view}, registered"] = partial(_registered, walk, azimuth)
         for way, measure in ways.items():
             errors[way] = {
-                source.clip: measure(_markers(motions[source.clip], source.part) * _scale(truth, motions[source.clip]))
+                source.clip: measure(
+                    _markers(motions[source.clip], source.part) * height / person_height(motions[source.clip])
+                )
                 for source in SOURCES
             }
     return Result(errors, truth.frame_rate / STEP)
@@ -106,20 +110,10 @@ def figure9(motions: Mapping[str, Motion], *, registered: bool = True) -> Result
 
 def _markers(motion: Motion, part: tuple[int | None, int | None]) -> Floats:
     """Every 4th frame (F, N, 3) of a part of the clip, without an inserted T-pose."""
-    places = motion.markers(MARKERS)
-    if motion.rest_frame is not None:
-        places = np.delete(places, motion.rest_frame, axis=0)
-    return places[slice(*part)][::STEP]
+    return moving_markers(motion)[slice(*part)][::STEP]
 
 
-def _scale(truth: Motion, motion: Motion) -> float:
-    heights = [m.report.height if m.report is not None else None for m in (truth, motion)]
-    if heights[0] is None or heights[1] is None:
-        raise ValueError("motions: want clips whose person's height is known")
-    return heights[0] / heights[1]
-
-
-def _turned(points: Floats, start: bool) -> Floats:
+def turned(points: Floats, start: bool) -> Floats:
     """The points turned about the vertical so that the person faces +Z at first, or in the mean."""
     azimuths = facing(dict(zip(MARKERS, points.transpose(1, 0, 2), strict=True)))
     assert azimuths is not None
@@ -129,27 +123,27 @@ def _turned(points: Floats, start: bool) -> Floats:
     return turned
 
 
-def _warped(drawn: Floats, seen: Floats) -> NDArray[np.int64]:
+def warped(drawn: Floats, seen: Floats) -> NDArray[np.int64]:
     """For each drawn frame the clip's, by the angles of arms and legs in the picture."""
-    return time_warp(pose_distance(pose_descriptor(drawn, _LIMBS), pose_descriptor(seen, _LIMBS))).frames
+    return time_warp(pose_distance(pose_descriptor(drawn, LIMB_PAIRS), pose_descriptor(seen, LIMB_PAIRS))).frames
 
 
 def _aligned(walk: Floats, azimuth: float, start: bool, points: Floats) -> Floats:
     camera = OrthographicCamera.from_angles(azimuth, 0)
-    walk, points = (_turned(clip - clip[:, :1], start) for clip in (walk, points))
-    frames = _warped(camera.project(walk), camera.project(points))
+    walk, points = (turned(clip - clip[:, :1], start) for clip in (walk, points))
+    frames = warped(camera.project(walk), camera.project(points))
     errors: Floats = np.abs(camera.depth(points[frames]) - camera.depth(walk)).mean(axis=1)
     return errors
 
 
 def _registered(walk: Floats, azimuth: float, points: Floats) -> Floats:
-    walk, points = _turned(walk, True), _turned(points, True)
+    walk, points = turned(walk, True), turned(points, True)
     camera = _camera(walk, azimuth)
     drawn = camera.project(walk)
     # For the warp the clip is seen as the walk is: the camera travels with its pelvis.
     beside = points - points[:, :1] + walk.mean(axis=0)[:1]
-    frames = _warped(drawn, camera.project(beside))
-    track = register_cameras(drawn, points[frames], IMAGE_SIZE, field_of_view=FIELD_OF_VIEW)
+    frames = warped(drawn, camera.project(beside))
+    track = register_cameras(drawn, points[frames], IMAGE_SIZE, field_of_view=FIELD_OF_VIEW, mode="auto", root="auto")
     rows = track.matrices[:, 2]
     depths = np.einsum("fi,fni->fn", rows[:, :3], track.points) + rows[:, 3:]
     truth = camera.depth(walk)

@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from pegbar.io.motion import read_motion
+from pegbar.report.clips import read_clips
 from pegbar.report.jain2010 import SOURCES, STEP, TRUTH, Result, figure9
-from pegbar.scene.motion import Motion
 
 NAME = "jain2010-fig9"
 _COLORS = ("#1f77b4", "#17becf", "#d62728", "#ff7f0e", "#9467bd", "#2ca02c", "#8c564b", "#555555")
@@ -28,26 +27,13 @@ def reproduce(data: Path, output: Path) -> list[str]:
     FormatError
         For a broken clip.
     """
-    paths = {clip: find_clip(data, clip) for clip in (TRUTH, *(source.clip for source in SOURCES))}
-    motions: dict[str, Motion] = {clip: read_motion(path) for clip, path in paths.items()}
-    result = figure9(motions)
+    result = figure9(read_clips(data, (TRUTH, *(source.clip for source in SOURCES))))
     output.mkdir(parents=True, exist_ok=True)
     files = [output / f"{NAME}.csv", output / f"{NAME}-frames.csv", output / f"{NAME}.png"]
     _write_means(files[0], result)
     _write_frames(files[1], result)
     write_plot(files[2], result)
     return [*table(result), "", *findings(result), "", *(f"wrote {file}" for file in files)]
-
-
-def find_clip(data: Path, clip: str) -> Path:
-    """Return the file of a CMU clip somewhere under ``data``: a BVH before an AMC; ValueError where there is none."""
-    if not data.is_dir():
-        raise FileNotFoundError(2, "No such folder", str(data))
-    names = (f"cmu_{clip}.bvh", f"{clip}.bvh", f"{clip}.amc")
-    for name in names:
-        if found := sorted(data.rglob(name)):
-            return found[0]
-    raise ValueError(f"--data: {data} lacks the CMU clip {clip} ({', '.join(names[:2])} or {names[2]})")
 
 
 def table(result: Result) -> list[str]:
@@ -69,8 +55,8 @@ def table(result: Result) -> list[str]:
     return [
         *lines,
         "",
-        "start: faces as the walk at its start; whole: by the mean facing; registered: a free camera found for the",
-        "clip itself. slow: a slow transcription (not the paper's figures, which are only drawn).",
+        "start: faces as the walk at its start; whole: by the mean facing; registered: the camera that pegbar",
+        "align finds for the clip itself. slow: a slow transcription (not the paper's figures, which are only drawn).",
     ]
 
 

@@ -1,4 +1,4 @@
-"""A contact sheet of what a search found: drawn poses in the first row, each match's poses at the same moments below."""
+"""A contact sheet of what a search found: drawn poses in the first row, each match's at the same moments below."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 _CELL, _MARGIN, _WORDS = 220, 22, 300
 _PAPER, _GREY, _BLACK = (255, 255, 255, 255), (176, 176, 176), (40, 40, 40)
-_COLORS = {"left": (214, 84, 40), "right": (40, 100, 200)}
+_COLORS = {"left": (40, 100, 200), "right": (214, 84, 40)}
 _HIPS = [MARKERS.index("left_hip"), MARKERS.index("right_hip")]
 _PAIRS = [(MARKERS.index(limb.start), MARKERS.index(limb.end)) for limb in LIMBS]
 
@@ -37,31 +37,54 @@ def match_sheet(
     """Return the sheet, (H, W, 3) uint8.
 
     ``drawn`` (n, 16, 2) are the canonical marks of n drawings in pixels, NaN where there is none; ``pictures`` are the
-    drawings, None where there is no picture. Left limbs are red, right ones blue; below, the drawn pose is grey behind
+    drawings, None where there is no picture. Left limbs are blue, right ones red; below, the drawn pose is grey behind
     each match's.
     """
-    count = len(drawn)
-    canvas = Canvas(_WORDS + count * _CELL, (1 + len(rows)) * _CELL, _PAPER)
     scale = _scale(drawn)
-    canvas.text((10, 30), "drawn", 12, _BLACK)
-    for column in range(count):
-        corner = (_WORDS + column * _CELL, 0)
-        if pictures[column] is not None:
-            canvas.paste(_crop(pictures[column], drawn[column], scale), *corner)
-        _figure(canvas, _placed(drawn[column], scale, corner), 2.0)
-        canvas.text((corner[0] + 6, _CELL - 6), captions[column], 9, _BLACK)
-    for place, row in enumerate(rows, 1):
-        top = place * _CELL
-        for line, words in enumerate(row.words):
-            canvas.text((10, top + 30 + 22 * line), words, 12 if line == 0 else 10, _BLACK)
-        size = scale * _likeness(drawn, row.points)
-        for column in range(count):
-            corner = (_WORDS + column * _CELL, top)
-            _figure(canvas, _placed(drawn[column], scale, corner), 5.0, _GREY)
-            _figure(canvas, _placed(row.points[column], size, corner), 2.5)
-            canvas.text((corner[0] + 6, top + _CELL - 6), row.captions[column], 9, _BLACK)
-        canvas.polyline([(0, top), (canvas.size[0], top)], 1, _GREY)
+    sheet = [[_words(("drawn",)), *(_drawn_cell(*cell, scale) for cell in zip(drawn, pictures, captions, strict=True))]]
+    for row in rows:
+        size = min(scale * _likeness(drawn, row.points), _largest(row.points))
+        cells = zip(drawn, row.points, row.captions, strict=True)
+        sheet.append([_words(row.words), *(_match_cell(*cell, scale, size) for cell in cells)])
+    return np.concatenate([np.concatenate(line, axis=1) for line in sheet])
+
+
+def _words(lines: Sequence[str]) -> Picture:
+    canvas = Canvas(_WORDS, _CELL, _PAPER)
+    for line, words in enumerate(lines):
+        canvas.text((10, 30 + 22 * line), words, 12 if line == 0 else 10, _BLACK)
+    return _finish(canvas)
+
+
+def _drawn_cell(pose: Floats, picture: Picture | None, caption: str, scale: float) -> Picture:
+    canvas = Canvas(_CELL, _CELL, _PAPER)
+    if picture is not None:
+        canvas.paste(_crop(picture, pose, scale), 0, 0)
+    _figure(canvas, _placed(pose, scale), 2.0)
+    canvas.text((6, _CELL - 6), caption, 9, _BLACK)
+    return _finish(canvas)
+
+
+def _match_cell(pose: Floats, points: Floats, caption: str, scale: float, size: float) -> Picture:
+    canvas = Canvas(_CELL, _CELL, _PAPER)
+    drawn = _placed(pose, scale)
+    _figure(canvas, drawn, 5.0, _GREY)
+    moved = (points - points[_HIPS].mean(axis=0)) * size + drawn[_HIPS].mean(axis=0)
+    _figure(canvas, moved if np.isfinite(moved[_HIPS]).all() else _placed(points, size), 2.5)
+    canvas.text((6, _CELL - 6), caption, 9, _BLACK)
+    return _finish(canvas)
+
+
+def _finish(canvas: Canvas) -> Picture:
+    """The cell's picture with a line above."""
+    canvas.polyline([(0, 0), (canvas.size[0], 0)], 1, _GREY)
     return over_paper(canvas.image())
+
+
+def _largest(points: Floats) -> float:
+    """The scale at which figures whose hips are in the middle of their cells still fit."""
+    reach = np.nanmax(np.abs(points - points[:, _HIPS].mean(axis=1, keepdims=True)), initial=1e-9)
+    return float((_CELL / 2 - _MARGIN / 2) / reach)
 
 
 def _scale(drawn: Floats) -> float:
@@ -89,9 +112,9 @@ def _likeness(drawn: Floats, points: Floats) -> float:
     return float(lengths(drawn)[known].sum() / max(lengths(points)[known].sum(), 1e-9))
 
 
-def _placed(pose: Floats, scale: float, corner: tuple[int, int]) -> Floats:
-    """A pose (16, 2) in the cell at ``corner``, its middle in the cell's."""
-    placed: Floats = (pose - _middle(pose)) * scale + corner + np.array([_CELL / 2, _CELL / 2])
+def _placed(pose: Floats, scale: float) -> Floats:
+    """A pose (16, 2) in a cell, its middle in the cell's."""
+    placed: Floats = (pose - _middle(pose)) * scale + np.array([_CELL / 2, _CELL / 2])
     return placed
 
 

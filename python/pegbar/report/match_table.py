@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from pegbar.align.match import Match, Matches
 from pegbar.io.clip_folder import ClipFolder
+from pegbar.io.numbers import format_frames
 from pegbar.scene.clip import Clip
 
 _VERDICTS = {"fits": "fits", "doubtful": "doubtful", "no": "does not fit"}
@@ -18,30 +19,41 @@ def describe_match(rank: int, match: Match, clip: Clip) -> tuple[str, ...]:
     return (
         f"{rank}  {match.clip.rsplit('/', 1)[-1]}",
         f"frames {_span(match)}, {_seconds(match, clip)} s",
-        f"azimuth {match.azimuth:.0f}, elevation {match.elevation:.0f}",
+        f"from {match.seen_from} ({match.azimuth:.0f}, {match.elevation:.0f})",
         match.sides,
         f"{match.cost:.1f} degrees: {_VERDICTS[match.verdict]}",
     )
 
 
-def report_matches(folder: ClipFolder, found: Matches) -> None:
-    """Print the matches, the best first, and a sentence on the best."""
+def report_matches(folder: ClipFolder, found: Matches, drawings: Sequence[int]) -> None:
+    """Print the matches, the best first, and what to say of the best; ``drawings`` are the drawings' numbers."""
     from rich.console import Console
     from rich.table import Table
 
     clips = {clip.name: clip for clip in folder.clips}
     table = Table(box=None, pad_edge=False, header_style="bold")
-    for name in ("", "clip", "frames", "seconds", "azimuth", "elevation", "left and right", "degrees", "verdict"):
+    for name in (
+        "",
+        "clip",
+        "frames",
+        "seconds",
+        "azimuth",
+        "elevation",
+        "seen from",
+        "left and right",
+        "degrees",
+        "verdict",
+    ):
         numeric = name in ("", "frames", "seconds", "azimuth", "elevation", "degrees")
         table.add_column(name, justify="right" if numeric else "left", no_wrap=True)
     for rank, match in enumerate(found.matches, 1):
-        view = (f"{match.azimuth:.0f}", f"{match.elevation:.0f}", match.sides)
+        view = (f"{match.azimuth:.0f}", f"{match.elevation:.0f}", match.seen_from, match.sides)
         verdict = f"[{_COLORS[match.verdict]}]{_VERDICTS[match.verdict]}[/]"
         seconds = _seconds(match, clips[match.clip])
         table.add_row(str(rank), match.clip, _span(match), seconds, *view, f"{match.cost:.1f}", verdict)
     console = Console(highlight=False) if sys.stdout.isatty() else Console(highlight=False, width=160)
     console.print(table)
-    console.print("\n" + _summary(found), soft_wrap=True)
+    console.print("\n" + _summary(found, drawings), soft_wrap=True)
 
 
 def report_left_out(broken: Mapping[str, str], skipped: Mapping[str, str]) -> None:
@@ -52,7 +64,7 @@ def report_left_out(broken: Mapping[str, str], skipped: Mapping[str, str]) -> No
         print(f"pegbar: warning: {name} is left out: {reason}", file=sys.stderr)
 
 
-def _summary(found: Matches) -> str:
+def _summary(found: Matches, drawings: Sequence[int]) -> str:
     limits = f"up to {found.fits:.1f} degrees fits, up to {found.doubtful:.1f} is doubtful"
     if not found.matches:
         return "Nothing fits: no clip is long enough."
@@ -65,7 +77,11 @@ def _summary(found: Matches) -> str:
     elif best.swapped:
         words.append("Left and right seem to be exchanged in the drawing" + _unsure(best) + ".")
     elif best.mirrored:
-        words.append("The drawing is like the clip's mirror image.")
+        otherwise = "" if best.sides_told else ", or left and right are exchanged in it"
+        words.append(f"The drawing is like the clip's mirror image{otherwise}.")
+    for group, frames in best.mixed.items():
+        numbers = format_frames(drawings[frame] for frame in frames)
+        words.append(f"In drawing {numbers} the {group} seem to be marked on the wrong sides.")
     return " ".join(words)
 
 

@@ -86,7 +86,7 @@ def _draw(panel: Any, points: dict[str, Floats], frames: Sequence[int]) -> None:
     if "pelvis" in points:
         panel.plot(*points["pelvis"].T, color=_MIDDLE, linewidth=0.6, linestyle=":", zorder=1)
     for order, frame in enumerate(frames):
-        fade = 1.0 if len(frames) == 1 else 0.2 + 0.8 * order / (len(frames) - 1)
+        fade = 1.0 - 0.8 * (len(frames) - 1 - order) / max(1, len(frames) - 1)
         style = {"alpha": fade, "linewidth": 1.8, "solid_capstyle": "round", "zorder": 2 + order}
         _chain(panel, points, frame, _TRUNK, _MIDDLE, style)
         # The left, which is nearer in the view from the left, over the right.

@@ -47,6 +47,9 @@ matte = "auto"
 [drawing.palette]            # colours beyond the annotation's limb colours
 {palette}
 
+[clip]
+path = "clip.bvh"
+
 [passes]
 beauty = "passes/passes.####.exr"
 depth = "passes/passes.####.exr"

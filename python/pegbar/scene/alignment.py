@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ class Alignment:
     drawn places, guessed where ``estimated`` (F, N): the drawing hides them. ``positions`` (F, N, 3) are the
     drawing's markers in world metres, which project exactly onto ``markers``; ``grounded`` (F, N) tells those whose
     depth is from the ground. ``errors`` (F,) are RMS distances between clip and seen marks in pixels, ``notes`` what a
-    user should know.
+    user should know; ``clip_path`` is the clip's file, and ``swapped`` says that left and right marks are exchanged.
     """
 
     names: tuple[str, ...]
@@ -35,10 +36,12 @@ class Alignment:
     errors: NDArray[np.float64]
     mode: str
     root: str
+    clip_path: str = ""
     mirrored: bool = False
+    swapped: bool = False
     notes: tuple[str, ...] = ()
 
-    @property
+    @cached_property
     def cameras(self) -> tuple[PerspectiveCamera, ...]:
         """The F cameras."""
         return tuple(PerspectiveCamera(matrix, self.image_size) for matrix in self.matrices)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,34 @@ LIMBS = (
         for side in _SIDES
     ),
 )
+
+
+#: What each canonical marker hangs on.
+HANGS_ON = {
+    "chest": "pelvis",
+    "neck": "chest",
+    "head": "neck",
+    **{f"{side}_shoulder": "neck" for side in _SIDES},
+    **{f"{side}_hip": "pelvis" for side in _SIDES},
+    **{
+        f"{side}_{outer}": f"{side}_{inner}"
+        for side in _SIDES
+        for chain in (("shoulder", "elbow", "hand"), ("hip", "knee", "foot", "toe"))
+        for inner, outer in pairwise(chain)
+    },
+}
+
+
+def bones_between(names: tuple[str, ...]) -> tuple[tuple[int, int], ...]:
+    """Pairs of places in ``names``: each marker below the pelvis, and the nearest one there that it hangs on."""
+    bones = []
+    for index, name in enumerate(names):
+        above = HANGS_ON.get(name)
+        while above is not None and above not in names:
+            above = HANGS_ON.get(above)
+        if above is not None:
+            bones.append((names.index(above), index))
+    return tuple(bones)
 
 
 def limbs_between(names: tuple[str, ...]) -> tuple[Limb, ...]:

@@ -17,8 +17,9 @@ def mirrored(motion: Motion) -> Motion:
     What was the left hand's joint is now the canonical right hand; joints keep their names, but for those that have a
     canonical marker's. Reflected twice it is the motion again.
     """
+    motion = _without_labels(motion)
     joints = {_other(marker): _other(joint) for marker, joint in motion.joint_map.items()}
-    return dataclasses.replace(
+    changed = dataclasses.replace(
         motion,
         names=tuple(map(_other, motion.names)),
         positions=motion.positions * _FLIP,
@@ -27,13 +28,30 @@ def mirrored(motion: Motion) -> Motion:
         rest=None if motion.rest is None else motion.rest * _FLIP,
         ends={_other(joint): end * _FLIP for joint, end in motion.ends.items()},
     )
+    return changed.knowing(joints)
 
 
 def exchanged(motion: Motion) -> Motion:
     """Return ``motion`` with the canonical markers of its two sides exchanged, for drawings that mix them up."""
+    motion = _without_labels(motion)
     joints = {_other(marker): _other(joint) for marker, joint in motion.joint_map.items()}
     ends = {_other(joint): end for joint, end in motion.ends.items()}
-    return dataclasses.replace(motion, names=tuple(map(_other, motion.names)), joints=joints, ends=ends)
+    changed = dataclasses.replace(motion, names=tuple(map(_other, motion.names)), joints=joints, ends=ends)
+    return changed.knowing(joints)
+
+
+def _without_labels(motion: Motion) -> Motion:
+    """Optical points as canonical markers, which can change sides; a skeleton as it is."""
+    if not motion.derived:
+        return motion
+    names = motion.known_markers
+    turns = np.broadcast_to(np.eye(3), (len(motion.positions), len(names), 3, 3))
+    places = motion.markers(names)
+    kept = {name: name for name in names}
+    points = dataclasses.replace(
+        motion, names=names, parents=(-1,) * len(names), positions=places, rotations=turns, joints=kept, rest=None
+    )
+    return points.knowing(kept)
 
 
 def _other(marker: str) -> str:

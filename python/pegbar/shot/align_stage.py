@@ -26,10 +26,12 @@ from pegbar.report.contact_sheet import contact_sheet, over_paper
 from pegbar.report.warp_plot import warp_picture
 from pegbar.scene.alignment import Alignment
 from pegbar.scene.drawing import Drawing
-from pegbar.shot.alignment import AlignOptions, Retiming, align_drawing
+from pegbar.shot.alignment import AlignOptions, align_drawing
 from pegbar.shot.clip_choice import Choice, choose_clip
+from pegbar.shot.marks import ALIGNED
 from pegbar.shot.plan import Shot
 from pegbar.shot.record import fingerprint, is_up_to_date, write_record
+from pegbar.shot.registered import CameraOptions, Retiming
 
 VERSION = 1
 _SHEET = 24
@@ -37,7 +39,10 @@ _SHEET = 24
 
 @dataclass(frozen=True, eq=False)
 class AlignStage:
-    """Aligns all drawings of ``shot``; nothing is done again that is up to date, unless ``overwrite``."""
+    """Aligns all drawings of ``shot``, unless that is up to date and not to be overwritten.
+
+    ``shot`` is to be opened without what was aligned before.
+    """
 
     shot: Shot
     overwrite: bool = False
@@ -55,7 +60,7 @@ class AlignStage:
     def outputs(self) -> list[Path]:
         """The files that the stage writes, the main one first."""
         overlays = [self.folder / f"overlay.{number:04d}.png" for number in self.numbers]
-        names = ("alignment.npz", "aligned.json", "errors.csv", "warp.png", "sheet.png")
+        names = ("alignment.npz", ALIGNED, "errors.csv", "warp.png", "sheet.png")
         return [*(self.folder / name for name in names), *overlays]
 
     def run(self, progress: Callable[[int, int], None] | None = None) -> tuple[Alignment, bool]:
@@ -76,7 +81,13 @@ class AlignStage:
         assert self.shot.settings.clip is not None
         choice = choose_clip(self.shot.settings.clip, self.shot.folder, drawing, holds, rate)
         alignment, retiming = align_drawing(drawing, choice.motion, choice.view, holds, rate, self._options())
-        alignment = dataclasses.replace(alignment, notes=(*choice.notes, *alignment.notes))
+        alignment = dataclasses.replace(
+            alignment,
+            clip_path=str(choice.path),
+            mirrored=choice.view.mirrored,
+            swapped=choice.view.swapped,
+            notes=(*choice.notes, *alignment.notes),
+        )
         self.folder.mkdir(parents=True, exist_ok=True)
         self._write(drawing, choice, alignment, retiming, progress)
         write_record(self.outputs(), self._recipe(), [fingerprint(path) for path in self._inputs()])
@@ -126,15 +137,9 @@ class AlignStage:
 
     def _options(self) -> AlignOptions:
         section = self.shot.settings.align
-        return AlignOptions(
-            field_of_view=None if section.field_of_view is None else math.radians(section.field_of_view),
-            mode=section.mode,
-            root=section.root,
-            smoothing=section.smoothing,
-            root_smoothing=section.root_smoothing,
-            ground=section.ground,
-            floor=section.floor,
-        )
+        wide = None if section.field_of_view is None else math.radians(section.field_of_view)
+        camera = CameraOptions(wide, section.mode, section.root, section.root_smoothing)
+        return AlignOptions(camera, section.smoothing, section.ground, section.floor)
 
     def _inputs(self) -> list[Path]:
         """The files that the result depends on: marks, pictures, and the clip or all clips of the folder."""

@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from pegbar.errors import FormatError
 from pegbar.io.atomic import complete_file
-from pegbar.shot.load import load_shot, validate_shot
-from pegbar.shot.model import ClipSection
 
+_READING = {"skeleton", "unit", "up", "frame_rate", "joints"}
 _HEADER = re.compile(r"\s*\[{1,2}\s*([^\]]+?)\s*\]{1,2}\s*(#.*)?$")
 
 
-def clip_text(section: ClipSection) -> str:
+def clip_text(section: Mapping[str, Any]) -> str:
     """Return the ``[clip]`` section as text."""
     return "\n".join(["[clip]", *(f"{key} = {value}" for key, value in _values(section).items()), ""])
 
 
-def write_clip(path: Path, section: ClipSection) -> None:
+def write_clip(path: Path, section: Mapping[str, Any]) -> None:
     """Put ``section`` into the shot file at ``path``, in place of the one that is there.
 
     Raises
@@ -28,6 +29,9 @@ def write_clip(path: Path, section: ClipSection) -> None:
     FileNotFoundError, FormatError, ShotError
         Where there is no shot file, or one with problems: it is left as it is.
     """
+    # The models of the shot file take long to import; printing a section does not need them.
+    from pegbar.shot.load import load_shot, validate_shot
+
     load_shot(path)
     text = path.read_bytes().decode("utf-8-sig")
     changed = replace_clip(text, section)
@@ -40,16 +44,21 @@ def write_clip(path: Path, section: ClipSection) -> None:
         part.write_text(changed, encoding="utf-8", newline="")
 
 
-def replace_clip(text: str, section: ClipSection) -> str:
-    """Return the TOML ``text`` with ``section`` in it: in place of its own, keeping its comments, or at the end."""
+def replace_clip(text: str, section: Mapping[str, Any]) -> str:
+    """Return the TOML ``text`` with ``section`` in it: in place of its own, keeping its comments, or at the end.
+
+    The folder to look in stays; what the old section says of how its clip is read stays where the clip stays.
+    """
     lines = text.splitlines()
     headers = [(number, found[1]) for number, line in enumerate(lines) if (found := _HEADER.match(line))]
     begin = next((number for number, name in headers if name == "clip"), None)
     if begin is None:
         return text.rstrip("\n") + "\n\n" + clip_text(section)
     end = next((number for number, _ in headers if number > begin), len(lines))
-    values = _values(section)
-    body = [line for old in lines[begin + 1 : end] if (line := _renewed(old, values)) is not None]
+    values, kept = _values(section), {"folder"}
+    if tomllib.loads(text)["clip"].get("path") == section["path"]:
+        kept |= _READING
+    body = [line for old in lines[begin + 1 : end] if (line := _renewed(old, values, kept)) is not None]
     while body and not body[-1].strip():
         body.pop()
     body += [f"{key} = {value}" for key, value in values.items()]
@@ -57,23 +66,24 @@ def replace_clip(text: str, section: ClipSection) -> str:
     return "\n".join([*lines[: begin + 1], *body, *rest]) + "\n"
 
 
-def _renewed(line: str, values: dict[str, str]) -> str | None:
+def _renewed(line: str, values: dict[str, str], kept: set[str]) -> str | None:
     """A line of the old section: with the new value (taken out of ``values``), as it is, or None for an old key."""
     found = re.match(r"(\s*)([\w-]+)(\s*=\s*)(\"(?:[^\"\\]|\\.)*\"|'[^']*'|[^#]*?)(\s*(?:#.*)?)$", line)
-    if not found:
+    if not found or found[2] in kept:
         return line
     if found[2] not in values:
         return found[1] + found[5].strip() if found[5].strip() else None
     return f"{found[1]}{found[2]}{found[3]}{values.pop(found[2])}{found[5]}"
 
 
-def _values(section: ClipSection) -> dict[str, str]:
-    return {key: _toml(value) for key, value in section.model_dump(exclude_none=True).items()}
+def _values(section: Mapping[str, Any]) -> dict[str, str]:
+    return {key: _toml(value) for key, value in section.items()}
 
 
 def _toml(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
-        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+        # What JSON escapes TOML escapes alike, but for one character.
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     return repr(value)

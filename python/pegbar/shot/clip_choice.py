@@ -14,8 +14,8 @@ from pegbar.io.motion import read_motion
 from pegbar.scene.clip import Clip
 from pegbar.scene.drawing import Drawing
 from pegbar.scene.motion import Motion
-from pegbar.shot.alignment import View
 from pegbar.shot.model import ClipSection
+from pegbar.shot.registered import View
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,7 @@ def choose_clip(
         view = _view(best)
     else:
         path = folder / section.path
-        motion = _read(section, folder, path)
+        motion = read_clip(section, folder, path)
         if section.azimuth is None or section.elevation is None:
             part = _named_part(motion, section)
             best = _best(_search(drawing, [Clip.from_motion(path.name, part)], holds, frame_rate), path.name)
@@ -69,7 +69,8 @@ def choose_clip(
     return Choice(path, motion, view, tuple(notes))
 
 
-def _read(section: ClipSection, folder: Path, path: Path) -> Motion:
+def read_clip(section: ClipSection, folder: Path, path: Path) -> Motion:
+    """Read the clip at ``path`` as ``section`` says; see `pegbar.read_motion`."""
     return read_motion(
         path,
         skeleton=folder / section.skeleton if section.skeleton else None,

@@ -125,14 +125,35 @@ class AlignSection(Section):
     """``[align]``: how the camera is found and the drawing's joints are put into 3D."""
 
     output: str = "align"
-    mode: Literal["auto", "static", "pan", "free", "given"] = "auto"
-    root: Literal["auto", "travel", "in_place"] = "auto"
-    field_of_view: float | None = Field(None, gt=0, lt=180)
-    smoothing: float = Field(0.0, ge=0, allow_inf_nan=False)
-    root_smoothing: float = Field(0.25, ge=0, allow_inf_nan=False)
+    mode: Literal["auto", "static", "pan", "free"] = "auto"
+    root: Literal["auto", "travel", "in_place"] | Annotated[float, Field(ge=0, le=1)] = "auto"
+    field_of_view: float | None = Field(default=None, gt=0, lt=180)
+    smoothing: float = Field(default=0.0, ge=0, allow_inf_nan=False)
+    root_smoothing: float = Field(default=0.25, ge=0, allow_inf_nan=False)
     ground: bool = False
-    floor: float | None = Field(None, allow_inf_nan=False)
+    floor: float | None = Field(default=None, allow_inf_nan=False)
     use: Literal["auto", "always", "never"] = "auto"
+
+
+class FlipEntry(Section):
+    """A limb whose depth is turned the other way by hand: the joint at its outer end, and for which drawings."""
+
+    joint: str
+    drawings: str
+
+
+class LiftSection(Section):
+    """``[lift]``: how the drawing becomes a 3D animation, and what is written."""
+
+    output: str = "lift"
+    depth: Literal["clip", "lengths"] = "clip"
+    stretch: bool = False
+    planted: bool = True
+    frame_rate: float | None = Field(default=None, gt=0, allow_inf_nan=False)
+    interpolation: Literal["step", "linear"] = "step"
+    loop: bool = False
+    formats: list[Literal["bvh", "glb", "usd", "csv", "npz"]] = ["bvh", "glb", "csv", "npz"]
+    flips: list[FlipEntry] = []
 
 
 class OutputSection(Section):
@@ -169,7 +190,8 @@ class ShotFile(Section):
     shot: ShotSection = Field(default_factory=ShotSection)
     drawing: DrawingSection
     clip: ClipSection | None = None
-    align: AlignSection = Field(default_factory=AlignSection)
+    align: AlignSection = AlignSection()
+    lift: LiftSection = LiftSection()
     camera: CameraSection | None = None
     passes: PassesSection | None = None
     output: OutputSection = Field(default_factory=OutputSection)

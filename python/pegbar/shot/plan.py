@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pegbar.errors import ShotError
-from pegbar.io.annotations import read_annotations
 from pegbar.io.exposure import Exposure
 from pegbar.io.frames import read_picture
 from pegbar.io.numbers import parse_frames
@@ -19,6 +19,7 @@ from pegbar.scene.camera import PerspectiveCamera
 from pegbar.scene.drawing import Drawing
 from pegbar.shot.find import KeyedError, Problems, check_clash, find_input, match_marks, plan_output
 from pegbar.shot.load import key_lines, load_shot
+from pegbar.shot.marks import read_marks
 from pegbar.shot.model import ShotFile, parse_color
 
 OUTPUTS = ("frames", "depth", "depth_picture", "holdout")
@@ -68,18 +69,22 @@ class Shot:
         return self.marks[number]
 
 
-def open_shot(path: str | Path) -> Shot:
+def open_shot(path: str | Path, *, aligned: bool = True) -> Shot:
     """Read the shot file at ``path`` and find all that it names.
+
+    ``aligned`` False takes the marks as annotated, without what `pegbar align` found.
 
     Raises ShotError with every problem at once (missing sequences, unknown limbs, outputs that would replace inputs),
     each with its line; FormatError or FileNotFoundError for an unreadable shot file.
     """
     path = Path(path)
     text = path.read_text(encoding="utf-8-sig", errors="replace") if path.is_file() else ""
-    return plan_shot(load_shot(path), path.absolute().parent, str(path), text)
+    return plan_shot(load_shot(path), path.absolute().parent, str(path), text, aligned=aligned)
 
 
-def plan_shot(settings: ShotFile, folder: Path, source: str = "options", text: str = "") -> Shot:
+def plan_shot(
+    settings: ShotFile, folder: Path, source: str = "options", text: str = "", *, aligned: bool = True
+) -> Shot:
     """Return the shot of validated ``settings`` whose paths start at ``folder``; see `open_shot`."""
     problems = Problems(source, key_lines(text))
     drawing, passes = settings.drawing, settings.passes
@@ -90,7 +95,7 @@ def plan_shot(settings: ShotFile, folder: Path, source: str = "options", text: s
     drawings, beauty = inputs["drawing.frames"], inputs.get("passes.beauty")
     if beauty is not None and passes is not None and not passes.depth and beauty.suffix.lower() != ".exr":
         problems.call("passes.beauty", _refuse, f"{beauty.pattern} has no depth: passes.depth must name the depth pass")
-    annotations = problems.call("drawing.annotations", _read_marks, folder, drawing.annotations)
+    annotations = problems.call("drawing.annotations", partial(read_marks, aligned=aligned), settings, folder)
     palette = problems.call("drawing.palette", _palette, settings, annotations)
     if settings.camera:
         size = settings.shot.size or (annotations.image_size if annotations else (1, 1))
@@ -126,10 +131,6 @@ def _outputs(
 
 def _refuse(problem: str) -> None:
     raise ValueError(problem)
-
-
-def _read_marks(folder: Path, name: str | None) -> Drawing | None:
-    return read_annotations(folder / name) if name else None
 
 
 def _palette(settings: ShotFile, annotations: Drawing | None) -> Palette:

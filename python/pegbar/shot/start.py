@@ -117,6 +117,9 @@ matte = "auto"               # auto, ink, unmix, fill or alpha
 # [drawing.palette]          # further colours and the limbs that they belong to
 # "#8a4b2a" = "head"
 
+# [clip]                     # motion capture: pegbar align finds cameras and depths with it
+# folder = "mocap"           # clips to choose from; pegbar match --write names the best one here
+
 {"" if "beauty" in values else "# "}[passes]
 {_line("beauty", values)}
 {_line("depth", values)}

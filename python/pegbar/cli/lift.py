@@ -1,0 +1,44 @@
+"""`pegbar lift`: a drawn sequence as 3D animation."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from pegbar.shot.align_stage import AlignStage
+from pegbar.shot.lift_stage import LiftStage
+from pegbar.shot.plan import open_shot
+
+
+def lift(
+    shot: Path,
+    *,
+    overwrite: Annotated[bool, Parameter(negative="", help="Lift again what is up to date.")] = False,
+) -> int:
+    """Make a 3D animation of a shot's drawing; see `pegbar lift --help`.
+
+    Parameters
+    ----------
+    shot
+        The shot file.
+    """
+    stage = LiftStage(AlignStage(open_shot(shot, aligned=False)), overwrite)
+    values, made = stage.run()
+    if values["skeleton_reprojection_px"] > 3 * max(values["marker_reprojection_px"], 5.0):
+        print("pegbar: warning: the clip's bones do not fit the drawn limbs well; see report.json", file=sys.stderr)
+    slide = values["foot_slide_m_per_drawing"]
+    parts = [
+        f"markers {values['marker_reprojection_px']:.1f} px and skeleton {values['skeleton_reprojection_px']:.1f} px "
+        "from the drawing",
+        f"skeleton {100 * values['skeleton_to_markers_m']:.1f} cm from the markers",
+    ]
+    if slide is not None:
+        parts.append(f"standing feet slide {1000 * slide:.0f} mm a drawing")
+    print(f"lift: {', '.join(parts)}")
+    files = ", ".join(path.name for path in stage.outputs())
+    print(f"lift: {'written' if made else 'up to date'}: {files}, in {os.path.relpath(stage.folder)}")
+    return 0

@@ -1,0 +1,147 @@
+"""The clip at the drawings' times, and the cameras that see it as drawn; each helps to find the other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pegbar.align.camera_track import CameraTrack
+from pegbar.align.descriptor import limb_trust, pose_descriptor, pose_distance
+from pegbar.align.registration import register_cameras
+from pegbar.align.retime import retime, sample_markers
+from pegbar.align.times import smooth_weighted
+from pegbar.align.timewarp import TimeWarp, time_warp
+from pegbar.scene.body import limbs_between
+from pegbar.scene.motion import Motion
+from pegbar.scene.orthographic import OrthographicCamera
+
+Floats = NDArray[np.float64]
+# The warp chooses among one clip pose a drawing, at most so many times faster or slower than drawn. More poses would
+# make every drawing that the clip takes longer for dearer. Then each time is settled among so many poses between.
+_SLOPE, _FINE = 3, 4
+# How much changes of the clip's speed count against its distance from each drawing's cheapest time.
+_STIFFNESS = 4.0
+
+
+@dataclass(frozen=True)
+class View:
+    """Which part of a clip a drawing shows and from where: clip frames from ``start`` to before ``stop``, degrees.
+
+    ``mirrored`` says that the clip's mirror image is meant, ``swapped`` that the drawing's left and right marks are
+    exchanged.
+    """
+
+    start: int
+    stop: int
+    azimuth: float
+    elevation: float
+    mirrored: bool = False
+    swapped: bool = False
+
+
+@dataclass(frozen=True)
+class CameraOptions:
+    """``field_of_view`` in radians (None: solved), ``mode`` and ``root`` as `register_cameras` takes them.
+
+    ``root_smoothing`` in seconds is that of `retime`.
+    """
+
+    field_of_view: float | None = None
+    mode: Literal["auto", "static", "pan", "free"] = "auto"
+    root: Literal["auto", "travel", "in_place"] | float = "auto"
+    root_smoothing: float = 0.25
+
+
+@dataclass(frozen=True, eq=False)
+class Marks:
+    """A drawing's marks (F, N, 2), which are seen (F, N), their names, and the time that each drawing is shown (F,)."""
+
+    places: Floats
+    seen: NDArray[np.bool_]
+    names: tuple[str, ...]
+    holds: Floats
+    image_size: tuple[int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class Retiming:
+    """The time warp of a drawing: ``cost`` (F, G) of its poses and the clip's at frames ``moments`` (G,).
+
+    ``times`` (F,) is the clip's frame at each drawing, in fractions.
+    """
+
+    cost: Floats
+    moments: Floats
+    warp: TimeWarp
+    times: Floats
+
+
+def register_clip(
+    marks: Marks, clip: Motion, view: View, rate: float, options: CameraOptions
+) -> tuple[Retiming, CameraTrack]:
+    """Return when each drawing is in ``clip`` and the cameras that see it so; ``rate`` is drawings a second.
+
+    The clip is retimed as seen under parallel rays from the view; then, as a free camera shows that perspective turns a
+    figure that walks past, once more as the cameras see it.
+    """
+    moments = np.arange(view.start, view.stop - 1 + 1e-9, clip.frame_rate / rate / _FINE)
+    poses = sample_markers(clip.markers(marks.names), moments, rest_frame=clip.rest_frame)
+    seen = OrthographicCamera.from_angles(view.azimuth, view.elevation).project(poses)
+    retiming = _retimed(marks, [seen], moments)
+    track = _track(marks, clip, retiming, rate, CameraOptions(options.field_of_view, "free", "travel"))
+    middles = np.nanmean(track.points, axis=1)
+    shapes = poses - np.nanmean(poses, axis=1, keepdims=True)
+    views = [camera.project(shapes + middle) for camera, middle in zip(track.cameras, middles, strict=True)]
+    retiming = _retimed(marks, views, moments)
+    return retiming, _track(marks, clip, retiming, rate, options)
+
+
+def _retimed(marks: Marks, views: Sequence[Floats], moments: Floats) -> Retiming:
+    """The clip warped to the drawings; ``views`` are its poses (G, N, 2) as one or all of the drawings see them."""
+    limbs = [(marks.names.index(limb.start), marks.names.index(limb.end)) for limb in limbs_between(marks.names)]
+    drawn = np.where(marks.seen[..., None], marks.places, np.nan)
+    angles, trust = pose_descriptor(drawn, limbs), limb_trust(drawn, limbs)
+    rows = []
+    for part, seen in zip(np.array_split(np.arange(len(drawn)), len(views)), views, strict=True):
+        clip_trust = limb_trust(seen, limbs)
+        angle = pose_descriptor(seen, limbs)
+        rows.append(pose_distance(angles[part], angle, a_trust=trust[part], b_trust=clip_trust))
+    fine = np.concatenate(rows)
+    cost = np.ascontiguousarray(fine[:, ::_FINE])
+    warp = time_warp(cost, open_begin=True, open_end=True, slope_limit=_SLOPE, holds=marks.holds)
+    times = _settled(fine, warp.times * _FINE, marks.holds)
+    return Retiming(cost, moments[::_FINE], warp, np.interp(times, np.arange(len(moments)), moments))
+
+
+def _settled(cost: Floats, times: Floats, holds: Floats) -> Floats:
+    """Times (F,) near ``times``, in columns of ``cost``, that are cheap and run smoothly.
+
+    Each drawing's cost is taken for a parabola about its cheapest column near by; where it is flat, neighbours decide.
+    """
+    rows, last = np.arange(len(cost)), cost.shape[1] - 1
+    if last < 2:
+        return times
+    near = np.clip(np.rint(times)[:, None] + np.arange(-_FINE, _FINE + 1), 1, last - 1).astype(np.intp)
+    best = near[rows, np.argmin(cost[rows[:, None], near], axis=1)]
+    before, here, after = (cost[rows, best + step] for step in (-1, 0, 1))
+    bend = np.maximum(before - 2 * here + after, 1e-6)
+    lowest = best + np.clip((before - after) / (2 * bend), -1, 1)
+    return smooth_weighted(lowest, bend, holds[:-1], _STIFFNESS).clip(0, last)
+
+
+def _track(marks: Marks, clip: Motion, retiming: Retiming, rate: float, options: CameraOptions) -> CameraTrack:
+    moved = retime(clip, retiming.times, frame_rate=rate, root_smoothing=options.root_smoothing)
+    points = moved.markers(marks.names)
+    return register_cameras(
+        marks.places,
+        points,
+        marks.image_size,
+        visible=marks.seen & np.isfinite(points).all(axis=2),
+        field_of_view=options.field_of_view,
+        mode=options.mode,
+        root=options.root,
+    )

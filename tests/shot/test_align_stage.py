@@ -1,0 +1,120 @@
+import json
+
+import numpy as np
+import pytest
+
+from pegbar import read_annotations
+from pegbar.cli.main import main
+from pegbar.errors import FormatError, ShotError
+from pegbar.io.alignment import read_alignment
+from pegbar.sample.shot import write_sample
+from pegbar.shot.align_stage import AlignStage
+from pegbar.shot.plan import open_shot
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """The sample shot, 16 small frames, aligned with its own clip; annotations without cameras and depths."""
+    folder = tmp_path_factory.mktemp("aligned")
+    shot = write_sample(folder, size=(240, 136), frames=16, samples=1)
+    marks = json.loads((folder / "annotation.json").read_text())
+    for key in ("camera", "cameras", "depths"):
+        marks.pop(key, None)
+    for frame in marks["frames"]:
+        for key in ("camera", "depths"):
+            frame.pop(key, None)
+    (folder / "annotation.json").write_text(json.dumps(marks))
+    assert read_annotations(folder / "annotation.json").depths is None
+    assert main(["align", str(shot)]) == 0
+    return shot
+
+
+def test_depth_order_of_the_limbs_is_the_truths(made):
+    alignment = read_alignment(made.parent / "align" / "alignment.npz")
+    truth = np.load(made.parent / "truth.npz")
+    order = [truth["names"].tolist().index(name) for name in alignment.names]
+    true = np.einsum("fi,fni->fn", truth["matrices"][:, 2, :3], truth["drawn"][:, order])
+    apart = true[:, :, None] - true[:, None]
+    found = alignment.depths[:, :, None] - alignment.depths[:, None]
+    told = np.abs(apart) > 0.02
+    assert (np.sign(apart) == np.sign(found))[told].mean() > 0.95
+
+
+def test_results_stand_until_something_changes(made, capsys):
+    stage = AlignStage(open_shot(made, aligned=False))
+    before = {path: path.stat().st_mtime_ns for path in stage.outputs()}
+    assert main(["align", str(made)]) == 0
+    assert "up to date" in capsys.readouterr().out
+    assert {path: path.stat().st_mtime_ns for path in stage.outputs()} == before
+    assert stage.is_done()
+    text = made.read_text()
+    made.write_text(text + "\n[align]\nsmoothing = 2\n")
+    assert not AlignStage(open_shot(made, aligned=False)).is_done()
+    made.write_text(text)
+    (stage.folder / "warp.png").unlink()
+    assert not stage.is_done()
+    assert main(["align", str(made)]) == 0
+
+
+def test_aligned_marks_give_the_drawing_its_depth(made):
+    shot = open_shot(made)
+    assert shot.annotations is not None
+    assert shot.annotations.depths is not None
+    alignment = read_alignment(made.parent / "align" / "alignment.npz")
+    np.testing.assert_allclose(shot.annotations.depths, alignment.depths, atol=1e-6)
+    assert main(["depth", str(made), "--frames", "1-2"]) == 0
+    assert open_shot(made, aligned=False).annotations.depths is None
+
+
+def test_stale_marks_are_refused(made, tmp_path):
+    path = made.parent / "annotation.json"
+    text = path.read_text()
+    marks = json.loads(text)
+    marks["frames"][0]["xy"][0][0] += 1
+    path.write_text(json.dumps(marks))
+    try:
+        with pytest.raises(ShotError, match="pegbar align again"):
+            open_shot(made)
+    finally:
+        path.write_text(text)
+    open_shot(made)
+
+
+def test_use_decides(made):
+    text = made.read_text()
+    try:
+        made.write_text(text + '\n[align]\nuse = "never"\n')
+        assert open_shot(made).annotations.depths is None
+        made.write_text(text + '\n[align]\nuse = "always"\noutput = "elsewhere"\n')
+        with pytest.raises(ShotError, match="run pegbar align first"):
+            open_shot(made)
+    finally:
+        made.write_text(text)
+
+
+def test_a_shot_without_a_clip_says_what_to_do(made, capsys):
+    text = made.read_text()
+    try:
+        made.write_text(text.replace('[clip]\npath = "clip.bvh"\n', ""))
+        assert main(["align", str(made)]) == 2
+        assert "[clip]" in capsys.readouterr().err
+        made.write_text(text.replace("clip.bvh", "nothing.bvh"))
+        assert main(["align", str(made)]) == 2
+        assert "nothing.bvh" in capsys.readouterr().err
+        made.write_text(text.replace('path = "clip.bvh"', "start = 3"))
+        assert main(["align", str(made)]) == 2
+        assert "want a path, or a folder" in capsys.readouterr().err
+        made.write_text(text.replace('"clip.bvh"', '"clip.bvh"\nstart = 900'))
+        assert main(["align", str(made)]) == 2
+        assert "16 frames" in capsys.readouterr().err
+    finally:
+        made.write_text(text)
+
+
+def test_a_broken_alignment_is_named(tmp_path):
+    (tmp_path / "a.npz").write_bytes(b"PK\x03\x04nonsense")
+    with pytest.raises(FormatError, match=r"a\.npz"):
+        read_alignment(tmp_path / "a.npz")
+    np.savez(tmp_path / "b.npz", names=["x"])
+    with pytest.raises(FormatError, match=r"b\.npz"):
+        read_alignment(tmp_path / "b.npz")
