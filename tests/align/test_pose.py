@@ -189,6 +189,15 @@ def test_memory_order_and_kind_of_input_do_not_matter():
     assert np.array_equal(fit_pose(np.asfortranarray(joints), wide, SIZE, active=[True] * 12).matrices, want)
 
 
+@pytest.mark.parametrize("unit", [1e-3, 1e3])
+def test_the_unit_and_place_of_the_poses_do_not_matter(unit):
+    clip = poses(4)
+    joints = noisy(seen_from(clip[1]), clip[1])
+    want, got = fit_pose(joints, clip, SIZE), fit_pose(joints, unit * np.add(clip, (3, 1, -40)), SIZE)
+    np.testing.assert_allclose(got.costs, want.costs, rtol=1e-6)
+    np.testing.assert_allclose(got.camera.position / unit - (3, 1, -40), want.camera.position, atol=1e-4)
+
+
 def test_threads_do_not_change_a_bit():
     code = (
         "import numpy as np, pegbar, hashlib; r = np.random.default_rng(0); p = r.normal(size=(61, 9, 3));"
