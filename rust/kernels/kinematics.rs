@@ -91,15 +91,16 @@ impl Skeleton<'_> {
             let base = usize::try_from(self.parents[joint]).map_or(Pose::WORLD, |parent| scratch.world[parent]);
             let rest = self.axes.get(joint);
             let mut axes = rest.map_or(base.axes, |rest| base.axes * *rest);
-            for column in next..next + self.counts[joint] {
+            let end = next + self.counts[joint];
+            for (column, &value) in values.iter().enumerate().take(end).skip(next) {
                 match self.channels[column] {
-                    Channel::Position(axis) => offset[axis] = values[column],
+                    Channel::Position(axis) => offset[axis] = value,
                     // Much of a body stands still: half of all angles are 0 in many files.
-                    Channel::Rotation(_) if values[column] == 0.0 => {}
+                    Channel::Rotation(_) if value == 0.0 => {}
                     Channel::Rotation(axis) => turn(&mut axes, axis, scratch.turns[column]),
                 }
             }
-            next += self.counts[joint];
+            next = end;
             let axes = rest.map_or(axes, |rest| axes * rest.transpose());
             let place = base.place + base.axes * offset;
             scratch.world[joint] = Pose { place, axes };
