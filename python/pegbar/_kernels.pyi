@@ -123,7 +123,7 @@ def forward_kinematics(
 def fit_poses(
     joints: _Doubles,
     poses: _Doubles,
-    options: tuple[list[float], float, float | None, float, str, float, int],
+    options: tuple[list[float], float, float | None, list[float], str, float, int],
 ) -> tuple[_Doubles, _Doubles, _Doubles]: ...
 def pose_distance(a: _Doubles, b: _Doubles, weights: _Doubles, a_trust: _Doubles, b_trust: _Doubles) -> _Doubles: ...
 def time_warp(

@@ -11,8 +11,8 @@ use pyo3::prelude::*;
 
 type Fits<'py> = (Bound<'py, PyArray3<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>);
 
-/// Principal point, focal length and its spread, upright spread, loss and its scale, starts.
-type Options<'py> = ([f64; 2], f64, Option<f64>, f64, &'py str, f64, usize);
+/// Principal point, focal length and its spread, spreads of roll and elevation, loss and its scale, starts.
+type Options<'py> = ([f64; 2], f64, Option<f64>, [f64; 2], &'py str, f64, usize);
 
 #[pyfunction]
 pub fn fit_poses<'py>(
@@ -21,9 +21,9 @@ pub fn fit_poses<'py>(
     poses: PyReadonlyArray3<'py, f64>,
     options: Options<'py>,
 ) -> PyResult<Fits<'py>> {
-    let (principal, focal, focal_spread, upright_spread, loss, scale, starts) = options;
-    let loss = named(loss)?;
-    let settings = Settings { principal: principal.into(), focal, focal_spread, upright_spread, loss, scale, starts };
+    let (principal, focal, focal_spread, [roll_spread, elevation_spread], loss, scale, starts) = options;
+    let (principal, loss) = (principal.into(), named(loss)?);
+    let settings = Settings { principal, focal, focal_spread, roll_spread, elevation_spread, loss, scale, starts };
     let [count, marks] = [poses.shape()[0], joints.shape()[0]];
     let out: Fits<'py> = (empty(py, [count, 3, 4])?, empty(py, [count])?, empty(py, [count, marks])?);
     let (mut matrices, mut costs, mut distances) = (out.0.readwrite(), out.1.readwrite(), out.2.readwrite());

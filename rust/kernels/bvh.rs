@@ -165,13 +165,16 @@ impl Bvh {
         let Some(wanted) = wanted.filter(|_| joints <= words.left().saturating_add(JOINTS_OF_SMALL_FILE)) else {
             return Err(header);
         };
-        self.values.reserve_exact(wanted);
-        while words.peek().is_some() {
-            let value = words.number()?;
-            if self.values.len() == wanted {
-                return Err(words.fault(format!("more numbers than {}", self.sizes())));
-            }
-            self.values.push(value);
+        let start = *words;
+        self.values = words.all_numbers(wanted + 1);
+        if words.peek().is_some() && self.values.len() < wanted {
+            words.number()?;
+        }
+        if self.values.len() > wanted || words.peek().is_some() {
+            *words = start;
+            words.numbers(wanted);
+            words.word();
+            return Err(words.fault(format!("more numbers than {}", self.sizes())));
         }
         if self.values.len() < wanted {
             let got = self.values.len();

@@ -91,13 +91,16 @@ impl Skeleton<'_> {
             let base = usize::try_from(self.parents[joint]).map_or(Pose::WORLD, |parent| scratch.world[parent]);
             let rest = self.axes.get(joint);
             let mut axes = rest.map_or(base.axes, |rest| base.axes * *rest);
-            for column in next..next + self.counts[joint] {
+            let end = next + self.counts[joint];
+            for (column, &value) in values.iter().enumerate().take(end).skip(next) {
                 match self.channels[column] {
-                    Channel::Position(axis) => offset[axis] = values[column],
+                    Channel::Position(axis) => offset[axis] = value,
+                    // Much of a body stands still: half of all angles are 0 in many files.
+                    Channel::Rotation(_) if value == 0.0 => {}
                     Channel::Rotation(axis) => turn(&mut axes, axis, scratch.turns[column]),
                 }
             }
-            next += self.counts[joint];
+            next = end;
             let axes = rest.map_or(axes, |rest| axes * rest.transpose());
             let place = base.place + base.axes * offset;
             scratch.world[joint] = Pose { place, axes };
@@ -144,6 +147,13 @@ const fn series(first: u64) -> [f64; 7] {
     found
 }
 
+/// The polynomial of seven coefficients, the highest first. Written out: a loop is not always unrolled, and then not
+/// worked for several angles at a time.
+#[inline(always)]
+fn horner(c: &[f64; 7], x: f64) -> f64 {
+    (((((c[0] * x + c[1]) * x + c[2]) * x + c[3]) * x + c[4]) * x + c[5]) * x + c[6]
+}
+
 /// Sine and cosine of angles in degrees, without branches so that several are worked at a time.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
 fn sines_and_cosines(degrees: &[f64], out: &mut [[f64; 2]]) {
@@ -151,11 +161,7 @@ fn sines_and_cosines(degrees: &[f64], out: &mut [[f64; 2]]) {
         let quarters = (angle * (1.0 / 90.0)).round_ties_even();
         let x = (angle - quarters * 90.0) * (PI / 180.0);
         let square = x * x;
-        let (mut sine, mut cosine) = (0.0, 0.0);
-        for (s, c) in SINE.iter().zip(COSINE) {
-            sine = sine * square + s;
-            cosine = cosine * square + c;
-        }
+        let (sine, cosine) = (horner(&SINE, square), horner(&COSINE, square));
         let sine = x - x * square * sine;
         let cosine = 1.0 - (0.5 * square - square * square * cosine);
         // The quarter turn, 0 to 3: of odd ones sine and cosine change places, then signs.
@@ -192,8 +198,14 @@ pub fn forward_kinematics(
     check_length("values", frames * width, values.len())?;
     check_length("positions", frames * joints, positions.len())?;
     check_length("rotations", frames * joints, rotations.len())?;
+    let mut start = Scratch { world: vec![Pose::WORLD; joints], turns: vec![[0.0; 2]; width] };
+    if rayon::current_num_threads() == 1 {
+        // Without the wait for another thread.
+        let frames = positions.chunks_mut(joints).zip(rotations.chunks_mut(joints)).zip(values.chunks(width));
+        frames.for_each(|((places, turns), values)| skeleton.pose(values, places, turns, &mut start));
+        return Ok(());
+    }
     let work = positions.par_chunks_mut(joints).zip(rotations.par_chunks_mut(joints)).zip(values.par_chunks(width));
-    let start = Scratch { world: vec![Pose::WORLD; joints], turns: vec![[0.0; 2]; width] };
     work.with_min_len(32).for_each_init(
         || start.clone(),
         |scratch, ((places, turns), values)| skeleton.pose(values, places, turns, scratch),

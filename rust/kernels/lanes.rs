@@ -24,7 +24,7 @@ macro_rules! lanewise {
             fn $method(self, other: Lanes) -> Lanes {
                 let mut out = self.0;
                 for (out, other) in out.iter_mut().zip(other.0) {
-                    *out = *out $operator other;
+                    *out $operator other;
                 }
                 Lanes(out)
             }
@@ -32,10 +32,10 @@ macro_rules! lanewise {
     };
 }
 
-lanewise!(Add, add, +);
-lanewise!(Sub, sub, -);
-lanewise!(Mul, mul, *);
-lanewise!(Div, div, /);
+lanewise!(Add, add, +=);
+lanewise!(Sub, sub, -=);
+lanewise!(Mul, mul, *=);
+lanewise!(Div, div, /=);
 
 impl Neg for Lanes {
     type Output = Lanes;

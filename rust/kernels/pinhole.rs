@@ -31,8 +31,10 @@ pub struct Target<'a> {
     pub log_focal: f64,
     /// How strongly the focal length is pulled there; None holds it there.
     pub focal_weight: Option<f64>,
-    /// How strongly the camera is pulled upright.
-    pub upright_weight: f64,
+    /// How strongly the camera is pulled out of a roll.
+    pub roll_weight: f64,
+    /// How strongly the camera is pulled to the level, from above and below.
+    pub elevation_weight: f64,
 }
 
 /// Eight cameras.
@@ -163,7 +165,7 @@ impl Normal {
         }
     }
 
-    /// Adds the pull of the focal length to its usual value and of the world's up to the picture's.
+    /// Adds the pulls of the focal length to its usual value and of the world's up to the picture's.
     #[inline(always)]
     fn add_priors(&mut self, camera: &Cameras, target: &Target) {
         self.matrix[at(1, 1)] = self.matrix[at(0, 0)];
@@ -180,13 +182,14 @@ impl Normal {
             }
             self.matrix[at(3, 3)] = Lanes::splat(1.0);
         }
-        // The world's up in camera axes: (0, -cos e, sin e) without roll, whatever the elevation e. A camera upside
-        // down is as level as an upright one, so there the second number counts as well.
+        // The world's up in camera axes: (0, -cos e, sin e) without roll, at the elevation e. A camera upside down is
+        // as level as an upright one, so there the second number counts as well.
         let [ux, uy, uz] = camera.rotation.map(|row| row[1]);
         let flipped = Lanes::ZERO.below(uy);
         let where_flipped = |value: Lanes| value.or(&flipped, Lanes::ZERO);
-        self.pull(target.upright_weight, ux, [Lanes::ZERO, uz, -uy]);
-        self.pull(target.upright_weight, where_flipped(uy), [where_flipped(-uz), Lanes::ZERO, where_flipped(ux)]);
+        self.pull(target.roll_weight, ux, [Lanes::ZERO, uz, -uy]);
+        self.pull(target.roll_weight, where_flipped(uy), [where_flipped(-uz), Lanes::ZERO, where_flipped(ux)]);
+        self.pull(target.elevation_weight, uz, [uy, -ux, Lanes::ZERO]);
     }
 
     /// Adds a residual with its weight and its slopes along the turn.
@@ -194,12 +197,12 @@ impl Normal {
     fn pull(&mut self, weight: f64, residual: Lanes, slopes: [Lanes; 3]) {
         let pull = Lanes::splat(weight * weight);
         self.cost = self.cost + pull * residual * residual;
-        for row in 0..3 {
-            let weighted = pull * slopes[row];
+        for (row, slope) in slopes.iter().enumerate() {
+            let weighted = pull * *slope;
             self.gradient[row + 4] = self.gradient[row + 4] + weighted * residual;
-            for column in 0..=row {
+            for (column, slope) in slopes.iter().enumerate().take(row + 1) {
                 let entry = at(row + 4, column + 4);
-                self.matrix[entry] = self.matrix[entry] + weighted * slopes[column];
+                self.matrix[entry] = self.matrix[entry] + weighted * *slope;
             }
         }
     }
@@ -279,7 +282,16 @@ mod tests {
     }
 
     fn target<'a>(points: &'a [[Lanes; 3]], marks: &'a [[f64; 2]], loss: Loss) -> Target<'a> {
-        Target { points, marks, loss, scale: 12.0, log_focal: 6.3, focal_weight: Some(3.0), upright_weight: 8.0 }
+        Target {
+            points,
+            marks,
+            loss,
+            scale: 12.0,
+            log_focal: 6.3,
+            focal_weight: Some(3.0),
+            roll_weight: 8.0,
+            elevation_weight: 2.0,
+        }
     }
 
     fn step(unknown: usize, size: Lanes) -> [Lanes; UNKNOWNS] {

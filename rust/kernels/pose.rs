@@ -21,8 +21,10 @@ pub struct Settings {
     pub focal: f64,
     /// How far ln f is usually off; None holds the focal length.
     pub focal_spread: Option<f64>,
-    /// How far the camera is usually off the upright, in radians; infinite does not care.
-    pub upright_spread: f64,
+    /// How far the camera is usually rolled, in radians; infinite does not care.
+    pub roll_spread: f64,
+    /// How far the camera usually stands above or below the level, in radians; infinite does not care.
+    pub elevation_spread: f64,
     /// What a residual costs.
     pub loss: Loss,
     /// Scale of the loss, in pixels.
@@ -95,7 +97,8 @@ fn fit_block(poses: &[DVec3], marks: &[[f64; 2]], settings: &Settings, found: &m
         scale: settings.scale,
         log_focal: settings.focal.ln(),
         focal_weight: settings.focal_spread.map(f64::recip),
-        upright_weight: settings.upright_spread.recip(),
+        roll_weight: settings.roll_spread.recip(),
+        elevation_weight: settings.elevation_spread.recip(),
     };
     // Losses that forget outliers forget whole limbs from a rough start: first the one that forgets nothing.
     let whole = if settings.loss == Loss::Squared { Loss::Squared } else { Loss::Huber };
@@ -232,7 +235,8 @@ mod tests {
         principal: DVec2::new(319.5, 239.5),
         focal: 900.0,
         focal_spread: Some(0.35),
-        upright_spread: 0.1,
+        roll_spread: 0.1,
+        elevation_spread: 0.5,
         loss: Loss::Huber,
         scale: 4.0,
         starts: 8,

@@ -320,7 +320,7 @@ mod tests {
         for open in [false, true] {
             for slope_limit in [None, Some(STEEPEST)] {
                 let rules = Rules { open_begin: open, open_end: open, slope_limit };
-                let Ok((total, path)) = time_warp(&cost, columns, rules) else { panic!("no path") };
+                let (total, path) = time_warp(&cost, columns, rules).unwrap_or_default();
                 assert!((sum(&cost, columns, &path) - total).abs() < 1e-9);
                 assert_eq!((path[0][0], path[path.len() - 1][0]), (0, 19));
             }

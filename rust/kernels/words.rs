@@ -2,16 +2,16 @@
 //!
 //! Lines end with LF, CR LF or a lone CR. A place is a byte's index; the line is counted only when a fault is told.
 
+use rayon::prelude::*;
 use std::str::from_utf8;
 use thiserror::Error;
 
 /// Larger numbers are no length or angle, and sums of them would overflow.
 const LARGEST: f64 = 1e12;
-/// Powers of ten that a double holds exactly.
-const POWERS: [f64; DIGITS + 1] =
-    [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
-/// So many digits are a whole number that a double holds exactly.
-const DIGITS: usize = 15;
+/// So many bytes of numbers are worked at a time.
+const PIECE: usize = 1 << 16;
+/// Powers of ten up to the eight digits that are worked at once.
+const POWERS: [f64; 9] = [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8];
 
 /// A file's text that is not what its format asks for.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -95,17 +95,69 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// The next word as a finite number.
-    #[inline]
-    pub fn number(&mut self) -> Result<f64, TextError> {
-        if self.peek().is_some()
-            && let Some((value, length)) = plain_number(&self.text[self.place..])
-        {
-            self.place += length;
-            return Ok(value);
+    /// Reads numbers up to the end, or to the first word that is none, which is then the next; at most `most`.
+    pub fn numbers(&mut self, most: usize) -> Vec<f64> {
+        let mut found = Vec::with_capacity(most.min(self.left() / 2 + 1));
+        let mut place = self.place;
+        while found.len() < most {
+            while self.text.get(place).is_some_and(|byte| is_white(*byte)) {
+                place += 1;
+            }
+            if let Some((value, length)) = plain_number(&self.text[place..]) {
+                found.push(value);
+                place += length;
+                continue;
+            }
+            self.place = place;
+            match self.word().map(number) {
+                Some(Ok(value)) => found.push(value),
+                Some(Err(_)) => break,
+                None => return found,
+            }
+            place = self.place;
         }
+        self.place = place;
+        found
+    }
+
+    /// The next word as a finite number.
+    pub fn number(&mut self) -> Result<f64, TextError> {
         let Some(word) = self.word() else { return Err(self.fault("the file ends where a number is due")) };
         number(word).map_err(|problem| self.fault_before(word, problem))
+    }
+
+    /// The numbers of the rest, up to the first word that is none, which is then the next. Above `most`
+    /// it may stop.
+    ///
+    /// Pieces of one size are worked in parallel, each from its first to its last whole word.
+    pub fn all_numbers(&mut self, most: usize) -> Vec<f64> {
+        if rayon::current_num_threads() == 1 {
+            return self.numbers(most);
+        }
+        let pieces: Vec<_> = (self.place..self.text.len()).step_by(PIECE).collect();
+        let read = |start: &usize| {
+            let stop = self.word_start((start + PIECE).min(self.text.len()));
+            let mut words = Words { text: &self.text[..stop], place: self.word_start(*start) };
+            (words.numbers(usize::MAX), words.peek().map(|_| words.place))
+        };
+        let read: Vec<_> = pieces.par_iter().map(read).collect();
+        let mut found = Vec::with_capacity(read.iter().map(|(numbers, _)| numbers.len()).sum());
+        for (numbers, rest) in read {
+            found.extend_from_slice(&numbers);
+            if let Some(place) = rest {
+                self.place = place;
+                return found;
+            }
+        }
+        self.place = self.text.len();
+        found
+    }
+
+    /// The first place from `place` on that is not inside a word.
+    fn word_start(&self, place: usize) -> usize {
+        let inside = place > self.place && !is_white(self.text[place - 1]);
+        let rest = if inside { &self.text[place..] } else { &[] };
+        place + rest.iter().position(|byte| is_white(*byte)).unwrap_or(rest.len())
     }
 
     /// The next word as a whole number that is not negative.
@@ -160,37 +212,76 @@ pub fn number(word: &[u8]) -> Result<f64, String> {
     if value.abs() <= LARGEST { Ok(value) } else { Err(format!("want a number up to 1e12, got {}", quoted(word))) }
 }
 
-/// The number at the start of a text and its length, when it is no larger than allowed, has no exponent, its digits fit
-/// a double exactly (one division then rounds it correctly) and what follows is white; else None.
-#[inline]
+/// The number at the start of a text and its length, when it has at most eight digits before its point and seven behind,
+/// no exponent, and what follows is white; else None. Such digits fit a double exactly: one division rounds correctly.
+#[inline(always)]
 fn plain_number(text: &[u8]) -> Option<(f64, usize)> {
     let start = usize::from(text.first() == Some(&b'-'));
-    let (digits, point) = digits(&text[start..], 0, DIGITS)?;
-    let (digits, end, behind) = if text.get(start + point) == Some(&b'.') {
-        let (all, length) = self::digits(&text[start + point + 1..], digits, DIGITS - point)?;
-        (all, start + point + 1 + length, length)
-    } else {
-        (digits, start + point, 0)
+    let (digits, behind, end) = match short_number(text, start) {
+        Some(found) => found,
+        None => long_number(text, start)?,
     };
-    let size = digits as f64 / POWERS[behind];
-    let is_plain = point + behind > 0 && size <= LARGEST && text.get(end).is_none_or(|byte| is_white(*byte));
-    is_plain.then_some((if start == 1 { -size } else { size }, end))
+    if end < text.len() && !is_white(text[end]) {
+        return None;
+    }
+    // The sign is set without a branch: it cannot be foreseen.
+    let size = (digits as i64 as f64 / POWERS[behind]).to_bits() | (start as u64) << 63;
+    Some((f64::from_bits(size), end))
 }
 
-/// Reads digits behind those of `value`; None when there are more than `most`.
+/// Digits with a point inside, eight bytes at most, worked at once: their digits as one number, how many stand behind the
+/// point, and their end.
 #[inline(always)]
-fn digits(text: &[u8], mut value: u64, most: usize) -> Option<(u64, usize)> {
-    for (length, byte) in text.iter().enumerate() {
-        let digit = byte.wrapping_sub(b'0');
-        if digit > 9 {
-            return Some((value, length));
-        }
-        if length == most {
-            return None;
-        }
-        value = value * 10 + u64::from(digit);
+fn short_number(text: &[u8], start: usize) -> Option<(u64, usize, usize)> {
+    let values = u64::from_le_bytes(*text.get(start..)?.first_chunk()?) ^ EIGHT_ZEROS;
+    let others = not_digits(values);
+    let point = others.trailing_zeros() / 8;
+    let end = (others & others.wrapping_sub(1)).trailing_zeros() / 8;
+    if end < 2 || point > 7 || (values >> (8 * point)) as u8 != b'.' ^ b'0' {
+        return None;
     }
-    Some((value, text.len()))
+    // The digits without the point, moved to the word's end, behind zeros.
+    let before = (1 << (8 * point)) - 1;
+    let digits = ((values & before) | ((values >> 8) & !before)) << (8 * (9 - end)).min(63);
+    Some((joined(digits), (end - 1 - point) as usize, start + end as usize))
+}
+
+/// The same with up to eight digits before and up to seven behind a point, which need not be there.
+#[inline(always)]
+fn long_number(text: &[u8], start: usize) -> Option<(u64, usize, usize)> {
+    let (whole, point) = digits(text, start)?;
+    if text.get(point) != Some(&b'.') {
+        return (point > start).then_some((whole, 0, point));
+    }
+    let (part, end) = digits(text, point + 1)?;
+    let behind = end - point - 1;
+    let is_plain = end - start > 1 && behind < 8;
+    is_plain.then(|| (whole * POWERS[behind] as u64 + part, behind, end))
+}
+
+/// Eight bytes that are the digit 0.
+const EIGHT_ZEROS: u64 = 0x3030_3030_3030_3030;
+
+/// Of eight bytes that were set against `EIGHT_ZEROS`: the high bit of each that is above 9.
+#[inline(always)]
+fn not_digits(values: u64) -> u64 {
+    (values | (values & 0x7f7f_7f7f_7f7f_7f7f).wrapping_add(0x7676_7676_7676_7676)) & 0x8080_8080_8080_8080
+}
+
+/// Up to eight digits from `place` on and where they end; None so near the text's end that there are no eight bytes.
+#[inline(always)]
+fn digits(text: &[u8], place: usize) -> Option<(u64, usize)> {
+    let values = u64::from_le_bytes(*text.get(place..)?.first_chunk()?) ^ EIGHT_ZEROS;
+    let count = not_digits(values).trailing_zeros() / 8;
+    Some((joined(values.checked_shl(64 - 8 * count).unwrap_or(0)), place + count as usize))
+}
+
+/// Eight digits, one a byte, the first in the lowest, as a number: pairs, fours and eights of them are joined.
+#[inline(always)]
+fn joined(ones: u64) -> u64 {
+    let pairs = ones.wrapping_mul(10).wrapping_add(ones >> 8) & 0x00ff_00ff_00ff_00ff;
+    let fours = pairs.wrapping_mul(100).wrapping_add(pairs >> 16) & 0x0000_ffff_0000_ffff;
+    fours.wrapping_mul(10_000).wrapping_add(fours >> 32) & 0xffff_ffff
 }
 
 #[cfg(test)]
@@ -214,6 +305,38 @@ mod tests {
         ] {
             let wanted: f64 = word.parse().unwrap_or(f64::NAN);
             assert_eq!(number(word.as_bytes()).map(f64::to_bits), Ok(wanted.to_bits()), "{word}");
+        }
+    }
+
+    #[test]
+    fn every_count_of_digits_is_read_as_the_standard_library_reads_it() {
+        for (before, behind) in (0..12).flat_map(|before| (0..12).map(move |behind| (before, behind))) {
+            for sign in ["", "-", "+"] {
+                let word = format!("{sign}{}.{}", &"98765432109876"[..before], &"01234567890123"[..behind]);
+                let wanted = word.parse::<f64>().map(f64::to_bits).ok();
+                let first = |text: &str| Words::new(text.as_bytes()).numbers(1).first().map(|value| value.to_bits());
+                for text in [word.clone(), format!("{word} 9 ........"), format!("{word}\n99999999")] {
+                    assert_eq!(first(&text), wanted, "{text}");
+                }
+                let whole = &word[..word.len() - behind - 1];
+                let wanted = whole.parse::<f64>().map(f64::to_bits).ok();
+                assert_eq!(first(&format!("{whole}\t1.5     ")), wanted, "{whole}");
+            }
+        }
+    }
+
+    #[test]
+    fn pieces_give_what_one_walk_gives() {
+        let text: String =
+            (0..40_000).map(|index| format!("{}{}", index % 1777, [" ", "\n", "\r\n  "][index % 3])).collect();
+        for (place, word) in [(0, "0"), (PIECE - 1, "x"), (PIECE, "1"), (PIECE + 1, "-"), (2 * PIECE, " "), (3, "nan ")]
+        {
+            let mut changed = text.clone();
+            changed.replace_range(place..place + 1, word);
+            let (mut pieces, mut walk) = (Words::new(changed.as_bytes()), Words::new(changed.as_bytes()));
+            assert!(pieces.all_numbers(usize::MAX) == walk.numbers(usize::MAX));
+            walk.peek();
+            assert_eq!(pieces.word(), walk.word(), "{place}");
         }
     }
 

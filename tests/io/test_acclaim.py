@@ -141,9 +141,9 @@ def test_angles_may_be_radians_in_each_file(tmp_path):
         places = 3 if name == "root" else 0
         turns = [repr(math.radians(float(word))) for word in words[places:]]
         lines.append(" ".join([name, *words[:places], *turns]) if words and ":" not in line else line)
-    other = read_acclaim(files(tmp_path, asf, "\n".join(lines)))
+    other = read_acclaim(files(tmp_path, asf, "\n".join([*lines, ""])))
     np.testing.assert_allclose(other.positions, plain.positions, atol=1e-13)
-    other = read_acclaim(files(tmp_path, ASF, "\n".join(lines).replace("FIED", "FIED\n:radians")))
+    other = read_acclaim(files(tmp_path, ASF, "\n".join([*lines, ""]).replace("FIED", "FIED\n:radians")))
     np.testing.assert_allclose(other.positions, plain.positions, atol=1e-13)
 
 

@@ -146,6 +146,17 @@ def test_the_index_goes_to_the_cache_where_the_folder_cannot_be_written(folder, 
     assert not (folder / clip_index.NAME).exists()
 
 
+def test_a_folder_marked_read_only_is_left_alone_by_anybody(folder, cache):
+    folder.chmod(0o555)
+    try:
+        found = read_clips(folder)
+        assert found.index.parent == cache / "pegbar"
+        assert not (folder / clip_index.NAME).exists()
+        assert read_clips(folder).read == 0
+    finally:
+        folder.chmod(0o755)
+
+
 def test_without_an_index_nothing_is_written(folder):
     found = read_clips(folder, use_index=False)
     assert (found.read, found.index) == (4, None)

@@ -60,20 +60,18 @@ def choose(shot: Shot, settings: Settings) -> Choice:
     if len(shot.marks) < 3:
         return Choice(static, {"static": HeldOut(static.noise, static.noise)})
     slow = replace(settings, window=SLOWNESS * settings.window)
-    free = fit(shot, "free", slow, (static,))
-    fits = {"static": static, "pan": fit(shot, "pan", slow, (static, free)), "free": free}
-    errors = {mode: held_out_errors(shot, fits[mode], settings, free.noise) for mode in MODES}
-    if not moves(errors):
+    drifting = fit(shot, "free", slow, (static,))
+    errors = {
+        "static": held_out_errors(shot, static, settings, drifting.noise),
+        "free": held_out_errors(shot, drifting, settings, drifting.noise),
+    }
+    if not errors["static"].gain_of(errors["free"]) > MOVE_GAIN:
         return Choice(static, errors)
-    free = fit(shot, "free", settings, (free,))
-    pan = fit(shot, "pan", settings, (fits["pan"], free))
-    turned, freed = (held_out_errors(shot, found, settings, free.noise) for found in (pan, free))
-    return Choice(free if turned.gain_of(freed) > FREE_GAIN else pan, errors)
-
-
-def moves(errors: dict[str, HeldOut]) -> bool:
-    """Whether the held-out errors of the three modes say that the camera does not stand still."""
-    return any(errors["static"].gain_of(errors[mode]) > MOVE_GAIN for mode in ("pan", "free"))
+    free = fit(shot, "free", settings, (drifting,))
+    pan = fit(shot, "pan", settings, (static, free))
+    for found in (pan, free):
+        errors[found.mode] = held_out_errors(shot, found, settings, free.noise)
+    return Choice(free if errors["pan"].gain_of(errors["free"]) > FREE_GAIN else pan, errors)
 
 
 def held_out_runs(frames: int, window: int) -> list[NDArray[np.intp]]:

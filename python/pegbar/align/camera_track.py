@@ -20,7 +20,7 @@ class CameraTrack:
     ``root`` ("travel", "in_place" or "scaled") are what was chosen, ``travel`` the share of the clip's travel that is
     kept, ``points`` (F, N, 3) float the points that the cameras see: the clip's with that travel. ``noise`` is the
     marks' robust standard deviation in pixels; ``trials`` holds, where the mode was chosen, the RMS distance of every
-    mode in frames held out; ``notes`` are what a user should know.
+    mode that was judged in frames held out; ``notes`` are what a user should know.
     """
 
     matrices: NDArray[np.float64]

@@ -17,10 +17,11 @@ Loss = Literal["squared", "huber", "cauchy", "geman_mcclure"]
 #: The usual lens, and how far its focal length strays (standard deviation of the logarithm).
 USUAL_FIELD_OF_VIEW = math.radians(40)
 FOCAL_SPREAD = 0.35
-#: How far a camera is usually from upright, in radians.
-UPRIGHT_SPREAD = math.radians(5)
-#: The loss's scale as part of the marks' extent.
-SCALE = 0.015
+#: How far a camera is usually rolled, and how far it stands above or below the level, in radians.
+ROLL_SPREAD = math.radians(5)
+ELEVATION_SPREAD = math.radians(30)
+#: The loss's scale, at least, as part of the marks' extent: marks by eye are no better.
+LEAST_SCALE = 0.015
 #: Marks narrower than this part of their length lie on one line.
 _LINE = 1e-6
 
@@ -37,7 +38,8 @@ def fit_pose(
     starts: int = 8,
     usual_field_of_view: float = USUAL_FIELD_OF_VIEW,
     focal_spread: float = FOCAL_SPREAD,
-    upright_spread: float = UPRIGHT_SPREAD,
+    roll_spread: float = ROLL_SPREAD,
+    elevation_spread: float = ELEVATION_SPREAD,
 ) -> PoseFit:
     """Find the pose of a clip, and the camera, under which it looks most like one picture (Hornung et al. 2007, s5).
 
@@ -60,14 +62,15 @@ def fit_pose(
     loss : {"huber", "squared", "cauchy", "geman_mcclure"}
         What a mark costs that is off by e scales: e^2 near zero; an outlier costs 2 e - 1, e^2, ln(1 + e^2), or 1.
     scale : float, optional
-        Scale of the loss in pixels: about the accuracy of the marks. None is 1.5% of the marks' extent.
+        Scale of the loss in pixels: how far marks are usually off. None is 1.5% of the marks' extent, or what half of
+        them are off where even the best pose fits worse (other proportions, or no such pose in the clip).
     starts : int
         Azimuths to start from, all round.
     usual_field_of_view, focal_spread : float
         Where the field of view is pulled when it is not given, in radians, and the spread of the focal length's
         logarithm: 0.35 is a third up or down.
-    upright_spread : float
-        How far from upright the camera may well be, in radians; infinity for pictures of any roll.
+    roll_spread, elevation_spread : float
+        How far the camera may well be rolled, and above or below the level, in radians; infinity does not care.
 
     Returns
     -------
@@ -91,37 +94,31 @@ def fit_pose(
     """
     if loss not in get_args(Loss):
         raise ValueError(f"loss: want one of {', '.join(get_args(Loss))}, got {loss!r}")
+    if scale is not None and not 0 < scale < math.inf:
+        raise ValueError(f"scale: want pixels, more than zero, got {scale}")
     size = arrays.integers("image_size", image_size, (2,), low=1)
     count = int(arrays.integers("starts", starts, (), low=1, high=10_000))
     marks, points, seen = _inputs(joints, poses, active)
     angle = _angle("usual_field_of_view", usual_field_of_view)
     if field_of_view is not None:
         angle = _angle("field_of_view", field_of_view)
-    spreads = {"focal_spread": focal_spread, "upright_spread": upright_spread}
+    spreads = {"focal_spread": focal_spread, "roll_spread": roll_spread, "elevation_spread": elevation_spread}
     for name, value in spreads.items():
         if not value > 0:
             raise ValueError(f"{name}: want more than zero, got {value}")
-    if scale is None:
-        scale = SCALE * float(np.linalg.norm(np.ptp(marks, axis=0)))
-    elif not 0 < scale < math.inf:
-        raise ValueError(f"scale: want pixels, more than zero, got {scale}")
-    principal = [(size[0] - 1) / 2, (size[1] - 1) / 2]
     focal = size[0] / 2 / math.tan(angle / 2)
-    options = (
-        principal,
-        focal,
-        focal_spread if field_of_view is None else None,
-        upright_spread,
-        loss,
-        float(scale),
-        count,
-    )
-    matrices, costs, distances = _kernels.fit_poses(marks, points, options)
+    camera = ([(size[0] - 1) / 2, (size[1] - 1) / 2], focal, focal_spread if field_of_view is None else None)
+    least = scale or LEAST_SCALE * float(np.linalg.norm(np.ptp(marks, axis=0)))
+    options = (*camera, [roll_spread, elevation_spread], loss)
+    matrices, costs, distances = _kernels.fit_poses(marks, points, (*options, least, count))
     if not np.isfinite(costs).any():
         raise DegenerateError("poses: the active joints of every pose lie on one line or in one place")
-    errors = np.sqrt(np.mean(distances**2, axis=1))
+    usual = float(np.median(distances[np.argmin(costs)]))
+    if scale is None and usual > least:
+        matrices, costs, distances = _kernels.fit_poses(marks, points, (*options, usual, count))
     joint_errors = np.full((len(points), len(seen)), np.nan)
     joint_errors[:, seen] = distances
+    errors = np.sqrt(np.mean(distances**2, axis=1))
     ranking = np.argsort(costs, kind="stable")
     return PoseFit(errors, joint_errors, costs, ranking, matrices, (int(size[0]), int(size[1])))
 
@@ -141,7 +138,8 @@ def _inputs(joints: ArrayLike, poses: ArrayLike, active: ArrayLike | None) -> tu
         raise ValueError("poses: want one pose or more, got none")
     seen = np.ones(len(marks), bool) if active is None else arrays.flags("active", active, (len(marks),))
     if seen.sum() < 4:
-        raise DegenerateError(f"active: want four joints or more, got {seen.sum()}")
+        name = "joints" if active is None else "active"
+        raise DegenerateError(f"{name}: want four joints or more, got {seen.sum()}")
     if len(missing := np.argwhere(seen & np.isnan(marks).any(axis=1))):
         raise ValueError(f"joints: want finite numbers where active, got NaN in joint {missing[0][0]}")
     if len(missing := np.argwhere(np.isnan(points).any(axis=2) & seen)):

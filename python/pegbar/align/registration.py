@@ -79,7 +79,7 @@ def register_cameras(
     root : {"travel", "in_place", "auto"} or float
         Whether the figure moves on as in the clip, is drawn on the spot (the clip's smooth horizontal travel taken
         out), or how large a share of the travel it keeps; "auto" looks for the share with which a still camera explains
-        the drawings about as well as the camera that the whole travel needs.
+        the drawings, when the whole travel needs one that moves.
     cameras : camera, cameras or (3, 4) or (F, 3, 4) float, optional
         For ``mode="given"``.
     robust : bool

@@ -13,14 +13,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pegbar.align.camera_choice import SLOWNESS, Choice, HeldOut, choose, held_out_errors
+from pegbar.align.camera_choice import SLOWNESS, Choice, choose
 from pegbar.align.camera_fit import Fit, Settings, fit
 from pegbar.align.camera_terms import Shot, huber
 from pegbar.align.root_motion import travelling
 
 Floats = NDArray[np.float64]
-#: A still camera with part of the travel is believed when it explains held-out frames at most so much worse.
-ROOT_LOSS = 1.25
+#: A camera that is told to stand still must see part of the travel so many times closer than the whole.
+_SHARE_GAIN = 1.25
 #: Shares of the travel that are tried before the best is refined, and how near to none counts as none.
 _SHARES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25)
 _NONE = 0.1
@@ -48,14 +48,13 @@ def choose_root(shot: Shot, world: Floats, settings: Settings, mode: str) -> Roo
     found, share = _best_share(shot, world, settings)
     if mode == "static":
         gain = _huber_cost(shot, whole.fit, found.noise) / max(_huber_cost(shot, found, found.noise), 1e-12)
-        return Root(Choice(found, {}), share, ()) if gain > ROOT_LOSS**2 else Root(whole, 1.0, ())
-    part = with_share(shot, world, settings, share)
-    errors = held_out_errors(part, found, settings, whole.fit.noise)
-    if errors.gain_of(min(whole.held_out.values())) > ROOT_LOSS:
+        return Root(Choice(found, {}), share, ()) if gain > _SHARE_GAIN**2 else Root(whole, 1.0, ())
+    part = choose(with_share(shot, world, settings, share), settings)
+    if part.fit.mode != "static":
         return Root(whole, 1.0, ())
     how = "in place" if share == 0 else f"with {share:.2f} of the clip's travel"
     note = f"root {how}: a still camera explains the drawings; with all of it the camera moves ({whole.fit.mode})"
-    return Root(Choice(found, {"static": errors, **_others(whole)}), share, (note,))
+    return Root(part, share, (note,))
 
 
 def choose_mode(shot: Shot, settings: Settings, mode: str) -> Choice:
@@ -64,10 +63,6 @@ def choose_mode(shot: Shot, settings: Settings, mode: str) -> Choice:
         return choose(shot, settings)
     others = (fit(shot, "static", settings),) if mode != "static" else ()
     return Choice(fit(shot, mode, settings, others), {})
-
-
-def _others(choice: Choice) -> dict[str, HeldOut]:
-    return {mode: errors for mode, errors in choice.held_out.items() if mode != "static"}
 
 
 def _best_share(shot: Shot, world: Floats, settings: Settings) -> tuple[Fit, float]:

@@ -4,26 +4,28 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solveh_banded
+from scipy.linalg import cho_solve_banded, cholesky_banded, solveh_banded
 
 Floats = NDArray[np.float64]
 
-_ROUNDS = 60  # the interior point needs 10 to 30
-# Where a bound is met without force the times come only as near as the root of the gap: 3e-6 of a frame.
-_GAP = 1e-11
-# A stiffer bound than this leaves the banded matrix without digits; the times stand long before.
-_STIFFEST = 1e13
+_ROUNDS = 80  # the interior point needs 10 to 40
+# Where a bound is met without force the times come only as near as the root of the gap: 1e-5 of a frame.
+_GAP = 1e-10
+# No bound's slack times force falls below this part of the mean: it would be pinned before the others are settled.
+_CENTRAL = 1e-3
+# Stiffer bounds than this leave the banded matrix without digits; by then the times move by less than 1e-3.
+_STIFFEST = 1e17
 
 
 def smooth_times(target: Floats, low: Floats, high: Floats, spacing: Floats, stiffness: float) -> Floats:
     """Return the times (F,) that minimise distance to ``target`` plus ``stiffness`` times changes of speed, squared.
 
-    The times lie in ``low``..``high`` (F,), both non-decreasing with low < high, and never decrease. ``spacing``
+    The times lie in ``low``..``high`` (F,), and like these and ``target`` never decrease. ``spacing``
     (F - 1,) are the durations between the entries; only their ratios count. Solved by a primal-dual interior point
     (Mehrotra's predictor and corrector) whose Newton matrix has two bands beside the diagonal.
     """
     count = len(target)
-    if count < 2:
+    if count < 2 or not stiffness:
         return np.clip(target, low, high)
     bands = stiffness * _bending(spacing)
     bands[0] += 1
@@ -88,41 +90,49 @@ class _Interior:
             gradient = self._multiply(times) - self.target + self._forces(force)
             violation = self._gaps(times) + slack - self.bound
             gap = float(slack @ force) / len(slack)
-            if gap < _GAP or (force / slack).max() > _STIFFEST:
+            stiff = force / slack
+            if gap < _GAP or stiff.max() > _STIFFEST:
                 break
             aim = slack * force
-            _, ds, dz = self._newton(gradient, violation, aim, slack, force)
+            factor = self._factor(stiff)
+            _, ds, dz = self._newton(factor, gradient, violation, aim, slack, force)
             step = _longest(slack, ds), _longest(force, dz)
             ahead = float((slack + step[0] * ds) @ (force + step[1] * dz)) / len(slack)
             aim = aim + ds * dz - gap * (ahead / gap) ** 3
-            dt, ds, dz = self._newton(gradient, violation, aim, slack, force)
+            dt, ds, dz = self._newton(factor, gradient, violation, aim, slack, force)
             step = 0.995 * _longest(slack, ds), 0.995 * _longest(force, dz)
             times, slack, force = times + step[0] * dt, slack + step[0] * ds, force + step[1] * dz
+            least = _CENTRAL * float(slack @ force) / len(slack)
+            slack = np.maximum(slack, least / force)
+            force = np.maximum(force, least / slack)
         return times
 
-    def _newton(
-        self, gradient: Floats, violation: Floats, aim: Floats, slack: Floats, force: Floats
-    ) -> tuple[Floats, Floats, Floats]:
+    def _factor(self, stiff: Floats) -> Floats:
         count = len(self.target)
-        stiff = force / slack
         bands = self.bands.copy()
         bands[0] += stiff[:count] + stiff[count : 2 * count]
         bands[0, :-1] += stiff[2 * count :]
         bands[0, 1:] += stiff[2 * count :]
         bands[1, :-1] -= stiff[2 * count :]
+        return np.asarray(cholesky_banded(bands, overwrite_ab=True, lower=True, check_finite=False), np.float64)
+
+    def _newton(
+        self, factor: Floats, gradient: Floats, violation: Floats, aim: Floats, slack: Floats, force: Floats
+    ) -> tuple[Floats, Floats, Floats]:
         pull = gradient + self._forces((force * violation - aim) / slack)
-        dt = solveh_banded(bands, -pull, lower=True, check_finite=False)
+        dt = cho_solve_banded((factor, True), -pull, overwrite_b=True, check_finite=False)
         ds = -violation - self._gaps(dt)
         return dt, ds, -(aim + force * ds) / slack
 
     @staticmethod
     def _gaps(times: Floats) -> Floats:
-        return np.concatenate([times, -times, -np.diff(times)])
+        return np.concatenate([times, -times, times[:-1] - times[1:]])
 
     def _forces(self, force: Floats) -> Floats:
         count = len(self.target)
-        order = np.diff(force[2 * count :], prepend=0, append=0)
-        total: Floats = force[:count] - force[count : 2 * count] + order
+        total: Floats = force[:count] - force[count : 2 * count]
+        total[:-1] += force[2 * count :]
+        total[1:] -= force[2 * count :]
         return total
 
     def _multiply(self, times: Floats) -> Floats:
@@ -136,5 +146,4 @@ class _Interior:
 
 def _longest(values: Floats, change: Floats) -> float:
     """The longest step up to 1 that leaves ``values`` positive."""
-    shrinking = change < 0
-    return float(1 / max(1, np.max(-change[shrinking] / values[shrinking], initial=1)))
+    return float(1 / max(1, -np.min(change / values)))

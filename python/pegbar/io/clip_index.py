@@ -69,11 +69,12 @@ def save_index(folder: Path, entries: list[Entry]) -> Path | None:
 
 
 def _places(folder: Path) -> list[Path]:
-    """In the folder, else in the user's cache."""
+    """In the folder, unless it is marked read-only (which does not stop everybody), else in the user's cache."""
     import xxhash
 
     unlike = xxhash.xxh3_64_hexdigest(os.fsencode(folder.resolve()))
-    return [folder / NAME, _cache() / "pegbar" / f"clips-{unlike}.index"]
+    own = [folder / NAME] if folder.stat().st_mode & 0o222 else []
+    return [*own, _cache() / "pegbar" / f"clips-{unlike}.index"]
 
 
 def _cache() -> Path:

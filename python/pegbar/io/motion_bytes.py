@@ -24,8 +24,8 @@ def read_bytes(path: str | os.PathLike[str]) -> bytes:
     if status.st_size > MAX_BYTES:
         raise FormatError(path, f"the file has {status.st_size} bytes, more than the limit of {MAX_BYTES}")
     with open(path, "rb") as file:
-        data = file.read(MAX_BYTES)
-    if not data.strip():
+        data = file.read()
+    if not data or data.isspace():
         raise FormatError(path, "the file is empty", line=1)
     return data
 
