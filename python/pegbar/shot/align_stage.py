@@ -138,7 +138,7 @@ class AlignStage:
     def _options(self) -> AlignOptions:
         section = self.shot.settings.align
         wide = None if section.field_of_view is None else math.radians(section.field_of_view)
-        camera = CameraOptions(wide, section.mode, section.root, section.root_smoothing)
+        camera = CameraOptions(wide, section.mode, section.root, section.root_smoothing, section.level)
         return AlignOptions(camera, section.smoothing, section.ground, section.floor)
 
     def _inputs(self) -> list[Path]:

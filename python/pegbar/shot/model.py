@@ -130,6 +130,7 @@ class AlignSection(Section):
     field_of_view: float | None = Field(default=None, gt=0, lt=180)
     smoothing: float = Field(default=0.0, ge=0, allow_inf_nan=False)
     root_smoothing: float = Field(default=0.25, ge=0, allow_inf_nan=False)
+    level: float = Field(default=0.0, ge=0, allow_inf_nan=False)
     ground: bool = False
     floor: float | None = Field(default=None, allow_inf_nan=False)
     use: Literal["auto", "always", "never"] = "auto"

@@ -48,13 +48,14 @@ class View:
 class CameraOptions:
     """``field_of_view`` in radians (None: solved), ``mode`` and ``root`` as `register_cameras` takes them.
 
-    ``root_smoothing`` in seconds is that of `retime`.
+    ``root_smoothing`` in seconds is that of `retime`, ``level`` the weight that keeps the camera level.
     """
 
     field_of_view: float | None = None
     mode: Literal["auto", "static", "pan", "free"] = "auto"
     root: Literal["auto", "travel", "in_place"] | float = "auto"
     root_smoothing: float = 0.25
+    level: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,12 +90,17 @@ def register_clip(
     The clip is retimed as seen under parallel rays from the view; then, as a free camera shows that perspective turns a
     figure that walks past, once more as the cameras see it.
     """
-    moments = np.arange(view.start, view.stop - 1 + 1e-9, clip.frame_rate / rate / _FINE)
+    pace = clip.frame_rate / rate
+    # Found times may lie a little outside what was found.
+    slack = 0.0 if view.times is None else pace
+    start = view.start - slack * (view.start >= slack)
+    stop = min(view.stop - 1 + slack, len(clip.positions) - 1)
+    moments = np.arange(start, stop + 1e-9, pace / _FINE)
     poses = sample_markers(clip.markers(marks.names), moments, rest_frame=clip.rest_frame)
     seen = OrthographicCamera.from_angles(view.azimuth, view.elevation).project(poses)
     columns = None if view.times is None else np.interp(view.times, moments, np.arange(len(moments)))
     retiming = _retimed(marks, [seen], moments, columns)
-    track = _track(marks, clip, retiming, rate, CameraOptions(options.field_of_view, "free", "travel"))
+    track = _track(marks, clip, retiming, rate, CameraOptions(options.field_of_view, "free", "travel", level=options.level))
     middles = np.nanmean(track.points, axis=1)
     shapes = poses - np.nanmean(poses, axis=1, keepdims=True)
     views = [camera.project(shapes + middle) for camera, middle in zip(track.cameras, middles, strict=True)]
@@ -160,4 +166,5 @@ def _track(marks: Marks, clip: Motion, retiming: Retiming, rate: float, options:
         field_of_view=options.field_of_view,
         mode=options.mode,
         root=options.root,
+        weights={"level": options.level},
     )
