@@ -32,7 +32,8 @@ fn poses(c: &mut Criterion) {
 }
 
 fn signs(c: &mut Criterion) {
-    let (planar, clip, noise) = (wave(FRAMES).iter().map(|x| 0.4 * x.abs()).collect::<Vec<_>>(), wave(FRAMES), [1e-3; FRAMES]);
+    let (planar, clip, noise) =
+        (wave(FRAMES).iter().map(|x| 0.4 * x.abs()).collect::<Vec<_>>(), wave(FRAMES), [1e-3; FRAMES]);
     let track = Track { planar: &planar, clip: &clip, noise: &noise, jolt: 0.01, doubt: 0.2 };
     let tracks = [track; LIMBS];
     let (lengths, candidates) = ([0.41; FRAMES * LIMBS], [0.42; 13 * LIMBS]);

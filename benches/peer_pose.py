@@ -46,7 +46,7 @@ def loop(joints: np.ndarray, poses: np.ndarray) -> np.ndarray:
         middle = points.mean(axis=0)
         depth = FOCAL * np.linalg.norm((points - middle)[:, :2]) / spread
         shift = (joints.mean(axis=0) - CENTER) * depth / FOCAL
-        start = np.concatenate([[0.0], turn, middle + (-shift[0], shift[1], depth)])
+        start = np.concatenate([[0.0], turn, middle + np.array([-shift[0], shift[1], depth])])
         costs[index] = 2 * least_squares(residuals, start, args=(joints, points), method="lm").cost
     return costs
 

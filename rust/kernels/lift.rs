@@ -60,7 +60,7 @@ pub fn lift(
 
 const UNSOLVED: &str = "the weights are too large or too small to solve for the pose";
 
-/// Normal equations of eq. 10 for a step away from a pose: the matrix, its lower triangle, and the right side.
+/// Normal equations of eq. 10 for a step away from a pose: the matrix and the right side.
 struct Normal {
     matrix: Vec<f64>,
     right: Vec<f64>,
@@ -150,7 +150,7 @@ fn pose_of_components(
         for (line, weight) in full.matrix.chunks_exact(size).zip(row) {
             accumulate(&mut image, line, *weight);
         }
-        components().take(k + 1).enumerate().for_each(|(l, other)| matrix[k * count + l] = inner(&image, other));
+        components().enumerate().skip(k).for_each(|(l, other)| matrix[k * count + l] = inner(&image, other));
     }
     solve(&mut matrix, &mut right)?;
     components().zip(&right).for_each(|(row, weight)| accumulate(pose, row, *weight));
@@ -161,28 +161,29 @@ fn accumulate(sum: &mut [f64], row: &[f64], weight: f64) {
     sum.iter_mut().zip(row).for_each(|(sum, value)| *sum += weight * value);
 }
 
-/// Cholesky on the lower triangle; the solution replaces `right`. None where the matrix is not positive definite.
+/// Cholesky on the upper triangle, row by row; the solution replaces `right`. None where the matrix is not positive
+/// definite. Rows are added to rows, which runs in wide registers, and zeros (markers that no limb joins) are skipped.
 fn solve(matrix: &mut [f64], right: &mut [f64]) -> Option<()> {
     let size = right.len();
-    for i in 0..size {
-        let (above, line) = matrix.split_at_mut(i * size);
-        for j in 0..i {
-            let other = &above[j * size..][..=j];
-            line[j] = (line[j] - inner(&line[..j], &other[..j])) / other[j];
-        }
-        let pivot = line[i] - inner(&line[..i], &line[..i]);
+    for k in 0..size {
+        let (above, below) = matrix.split_at_mut((k + 1) * size);
+        let line = &mut above[k * size..];
+        let pivot = line[k].sqrt();
         if !(pivot > 0.0 && pivot.is_finite()) {
             return None;
         }
-        line[i] = pivot.sqrt();
-        right[i] = (right[i] - inner(&line[..i], &right[..i])) / line[i];
+        line[k..].iter_mut().for_each(|value| *value /= pivot);
+        right[k] /= pivot;
+        let (solved, rest) = right.split_at_mut(k + 1);
+        accumulate(rest, &line[k + 1..], -solved[k]);
+        for (i, other) in (k + 1..size).zip(below.chunks_exact_mut(size)) {
+            if line[i] != 0.0 {
+                accumulate(&mut other[i..], &line[i..], -line[i]);
+            }
+        }
     }
-    for i in (0..size).rev() {
-        let line = &matrix[i * size..][..=i];
-        right[i] /= line[i];
-        let (before, value) = (&mut right[..=i], &line[..i]);
-        let solved = before[i];
-        accumulate(&mut before[..i], value, -solved);
+    for (i, line) in matrix.chunks_exact(size).enumerate().rev() {
+        right[i] = (right[i] - inner(&line[i + 1..], &right[i + 1..])) / line[i];
     }
     Some(())
 }
@@ -204,9 +205,9 @@ mod tests {
     #[test]
     fn cholesky_solves_a_known_system() {
         let mut right = [8.0, 7.0];
-        assert_eq!(solve(&mut [4.0, f64::NAN, 2.0, 3.0], &mut right), Some(()));
+        assert_eq!(solve(&mut [4.0, 2.0, f64::NAN, 3.0], &mut right), Some(()));
         assert!((right[0] - 1.25).abs() < 1e-12 && (right[1] - 1.5).abs() < 1e-12);
-        assert_eq!(solve(&mut [1.0, 0.0, 2.0, 1.0], &mut [0.0, 0.0]), None);
+        assert_eq!(solve(&mut [1.0, 2.0, 0.0, 1.0], &mut [0.0, 0.0]), None);
     }
 
     #[test]

@@ -26,7 +26,7 @@ def seen_from(pose, azimuth=0.7, elevation=0.2, field_of_view=0.7, distance=5.0,
     direction = np.array(
         [math.sin(azimuth) * math.cos(elevation), math.sin(elevation), math.cos(azimuth) * math.cos(elevation)]
     )
-    middle = pose.mean(axis=0) + (0.1, -0.2, 0)
+    middle = np.add(pose.mean(axis=0), (0.1, -0.2, 0))
     level = PerspectiveCamera.look_at(middle + distance * direction, middle, SIZE, field_of_view)
     turn = np.array([[math.cos(roll), -math.sin(roll), 0], [math.sin(roll), math.cos(roll), 0], [0, 0, 1]])
     return PerspectiveCamera.from_parts(turn @ level.rotation, level.position, SIZE, field_of_view)
@@ -46,7 +46,8 @@ def test_the_pose_that_was_drawn_and_its_camera_are_found(pose, azimuth, elevati
     fit = fit_pose(
         camera.project(clip[pose]), clip, SIZE, field_of_view=field_of_view, roll_spread=10, elevation_spread=10
     )
-    assert fit.pose == pose and fit.error < 0.5
+    assert fit.pose == pose
+    assert fit.error < 0.5
     np.testing.assert_allclose(fit.camera.position, camera.position, atol=0.02)
     np.testing.assert_allclose(fit.camera.rotation, camera.rotation, atol=0.01)
 
@@ -66,7 +67,8 @@ def test_costs_errors_and_ranking_are_those_of_the_oracle(loss):
         np.testing.assert_allclose(fit.costs[pose], np.sum(residuals**2), rtol=1e-6)
     assert fit.ranking.tolist() == np.argsort(fit.costs, kind="stable").tolist()
     assert fit.pose == fit.ranking[0] == 4
-    assert fit.error == fit.errors[4] and fit.camera == fit.cameras[4]
+    assert fit.error == fit.errors[4]
+    assert fit.camera == fit.cameras[4]
     assert "pose=4" in repr(fit)
 
 
@@ -85,7 +87,8 @@ def test_one_start_may_stay_on_the_wrong_side_and_eight_do_not():
     clip = poses(1) * (0.25, 1, 1)
     joints = seen_from(clip[0], azimuth=math.pi).project(clip[0])
     one, eight = (fit_pose(joints, clip, SIZE, starts=starts) for starts in (1, 8))
-    assert eight.error < 1 and one.errors[0] > 20
+    assert eight.error < 1
+    assert one.errors[0] > 20
 
 
 def test_outliers_spoil_a_squared_loss_only():
@@ -109,7 +112,8 @@ def test_what_is_switched_off_does_not_count_whatever_it_holds():
     want = fit_pose(joints[active], clip[:, active], SIZE)
     joints[0], joints[7], clip[:, 7], clip[2:, 0] = 9e9, np.nan, np.nan, np.nan
     got = fit_pose(joints, clip, SIZE, active=active)
-    assert np.array_equal(got.matrices, want.matrices) and np.array_equal(got.errors, want.errors)
+    assert np.array_equal(got.matrices, want.matrices)
+    assert np.array_equal(got.errors, want.errors)
     assert np.array_equal(got.joint_errors[:, active], want.joint_errors)
     assert np.isnan(got.joint_errors[:, ~active]).all()
 
@@ -129,7 +133,8 @@ def test_roll_and_elevation_are_held_only_as_far_as_asked():
     clip = poses(1)
     joints = seen_from(clip[0], elevation=0.5, roll=0.4).project(clip[0])
     loose, level = fit_pose(joints, clip, SIZE), fit_pose(joints, clip, SIZE, roll_spread=1e-4, elevation_spread=1e-4)
-    assert abs(loose.camera.rotation[0, 1]) > 0.3 and loose.camera.rotation[2, 1] < -0.3
+    assert abs(loose.camera.rotation[0, 1]) > 0.3
+    assert loose.camera.rotation[2, 1] < -0.3
     np.testing.assert_allclose(level.camera.rotation[[0, 2], 1], 0, atol=1e-3)
 
 
@@ -138,8 +143,10 @@ def test_a_picture_upside_down_is_not_seen_by_an_upside_down_camera():
     joints = SIZE - seen_from(clip[0], elevation=0).project(clip[0])
     spreads = ({"roll_spread": spread, "elevation_spread": spread} for spread in (1e-3, math.inf))
     held, free = (fit_pose(joints, clip, SIZE, **spread) for spread in spreads)
-    assert held.camera.rotation[1, 1] < -0.9 and held.error > 20
-    assert free.camera.rotation[1, 1] > 0.9 and free.error < 5
+    assert held.camera.rotation[1, 1] < -0.9
+    assert held.error > 20
+    assert free.camera.rotation[1, 1] > 0.9
+    assert free.error < 5
 
 
 def test_a_worse_scale_is_taken_where_no_pose_fits():
@@ -148,7 +155,8 @@ def test_a_worse_scale_is_taken_where_no_pose_fits():
     fit = fit_pose(joints, clip, SIZE)
     first = fit_pose(joints, clip, SIZE, scale=0.015 * float(np.linalg.norm(np.ptp(joints, axis=0))))
     second = fit_pose(joints, clip, SIZE, scale=float(np.median(first.joint_errors[first.pose])))
-    assert np.array_equal(fit.costs, second.costs) and fit.costs.min() < first.costs.min() / 2
+    assert np.array_equal(fit.costs, second.costs)
+    assert fit.costs.min() < first.costs.min() / 2
 
 
 def test_a_pose_on_one_line_is_ranked_last_and_has_no_camera():
@@ -156,7 +164,10 @@ def test_a_pose_on_one_line_is_ranked_last_and_has_no_camera():
     joints = seen_from(clip[2]).project(clip[2])
     clip[0] = np.arange(12)[:, None] * [0.1, 0.2, 0.3]
     fit = fit_pose(joints, clip, SIZE)
-    assert fit.pose == 2 and fit.ranking[-1] == 0 and math.isinf(fit.errors[0]) and fit.cameras[0] is None
+    assert fit.pose == 2
+    assert fit.ranking[-1] == 0
+    assert math.isinf(fit.errors[0])
+    assert fit.cameras[0] is None
     assert np.isnan(fit.matrices[0]).all()
 
 
@@ -165,7 +176,8 @@ def test_marks_may_lie_outside_the_picture_and_one_pose_will_do():
     camera = seen_from(clip[0])
     around = PerspectiveCamera.from_parts(camera.rotation, camera.position, (200, 100), 0.1)
     joints = around.project(clip[0])
-    assert (joints < 0).any() and (joints > 200).any()
+    assert (joints < 0).any()
+    assert (joints > 200).any()
     assert fit_pose(joints, clip, (200, 100), field_of_view=0.1).error < 0.5
 
 
@@ -177,6 +189,15 @@ def test_memory_order_and_kind_of_input_do_not_matter():
     assert np.array_equal(fit_pose(np.asfortranarray(joints), wide, SIZE, active=[True] * 12).matrices, want)
 
 
+@pytest.mark.parametrize("unit", [1e-3, 1e3])
+def test_the_unit_and_place_of_the_poses_do_not_matter(unit):
+    clip = poses(4)
+    joints = noisy(seen_from(clip[1]), clip[1])
+    want, got = fit_pose(joints, clip, SIZE), fit_pose(joints, unit * np.add(clip, (3, 1, -40)), SIZE)
+    np.testing.assert_allclose(got.costs, want.costs, rtol=1e-6)
+    np.testing.assert_allclose(got.camera.position / unit - (3, 1, -40), want.camera.position, atol=1e-4)
+
+
 def test_threads_do_not_change_a_bit():
     code = (
         "import numpy as np, pegbar, hashlib; r = np.random.default_rng(0); p = r.normal(size=(61, 9, 3));"
@@ -185,7 +206,10 @@ def test_threads_do_not_change_a_bit():
     )
     digests = {
         subprocess.run(
-            [sys.executable, "-c", code], env=os.environ | {"RAYON_NUM_THREADS": threads}, capture_output=True, check=True
+            [sys.executable, "-c", code],
+            env=os.environ | {"RAYON_NUM_THREADS": threads},
+            capture_output=True,
+            check=True,
         ).stdout
         for threads in ("1", "3")
     }

@@ -239,3 +239,38 @@ def test_options_of_refine_need_it(options):
     clip = swinging(17, 5)
     with pytest.raises(ValueError, match="refine=True"):
         reconstruct_markers(SIDE.project(clip), clip, SIDE, LIMBS, LENGTHS, **options)
+
+
+def test_cartoon_proportions_are_noticed():
+    clip = swinging(18, 80, 0.5)
+    short = clip.copy()
+    scales = np.where(LIMBS[:, 1] > 6, 0.45, 1.0)
+    for limb, (first, second) in enumerate(LIMBS):
+        short[:, second] = short[:, first] + scales[limb] * (clip[:, second] - clip[:, first])
+    drawn = SIDE.project(short)
+    assert_allclose(drawn_lengths(drawn, clip, SIDE, LIMBS), scales * LENGTHS, rtol=0.06)
+    assert off(refined(drawn, clip, SIDE, None), short) < 0.05
+
+
+def test_where_limbs_stretch_the_clip_counts_more():
+    clip = swinging(19, 80, 0.5)
+    pulled = clip.copy()
+    for limb, (first, second) in enumerate(LIMBS):
+        change = 1 + 0.1 * np.sin(np.arange(80) / 6 + limb)
+        pulled[:, second] = pulled[:, first] + change[:, None] * (clip[:, second] - clip[:, first])
+    drawn = SIDE.project(pulled)
+    kept, rigid = (off(refined(drawn, clip, SIDE, None, stretch=stretch), pulled) for stretch in (True, False))
+    assert kept < 0.6 * off(clip, pulled)
+    assert kept < 0.5 * rigid
+
+
+def test_a_track_of_cameras_is_taken():
+    clip = swinging(20, 12)
+    cameras = [
+        PerspectiveCamera.look_at((2, 1.5, 4 + frame / 10), (0, 0.9, 0), (1280, 720), 0.7) for frame in range(12)
+    ]
+    drawn = np.stack([camera.project(pose) for camera, pose in zip(cameras, clip, strict=True)])
+    track = type("Track", (), {"cameras": tuple(cameras)})()
+    got = refined(drawn, clip, track, noise=0)
+    assert off(got, clip) < 1e-6
+    assert_array_equal(got, refined(drawn, clip, cameras, noise=0))

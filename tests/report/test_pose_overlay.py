@@ -9,14 +9,14 @@ PAPER = np.full((700, 700, 3), 255, np.uint8)
 
 def spread_out():
     """Every marker at its own place of a grid."""
-    grid = np.array([(100 + 130 * column, 100 + 150 * row) for row in range(4) for column in range(4)], float)
-    return grid
+    return np.array([(100 + 130 * column, 100 + 150 * row) for row in range(4) for column in range(4)], float)
 
 
 def test_limbs_have_their_sides_colours_and_marks_their_discs():
     projected = spread_out()
-    image = pose_overlay(PAPER, MARKERS, projected + (20, 0), projected)
-    for start, end, side in (("left_hip", "left_knee", "left"), ("right_elbow", "right_hand", "right"), ("neck", "head", "")):
+    image = pose_overlay(PAPER, MARKERS, np.add(projected, (20, 0)), projected)
+    limbs = (("left_hip", "left_knee", "left"), ("right_elbow", "right_hand", "right"), ("neck", "head", ""))
+    for start, end, side in limbs:
         middle = np.rint(projected[[MARKERS.index(start), MARKERS.index(end)]].mean(axis=0)).astype(int)
         assert image[middle[1], middle[0], :3].tolist() == list(SIDES[side])
     assert image.shape == (700, 700, 4)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +17,9 @@ from pegbar.scene.drawing import Drawing
 from pegbar.scene.motion import Motion
 from pegbar.shot.model import ClipSection
 from pegbar.shot.registered import View
+
+# Two views less apart, in degrees, show the same poses at the same times.
+_SAME_VIEW = 20.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,15 +60,12 @@ def choose_clip(
     else:
         path = folder / section.path
         motion = read_clip(section, folder, path)
+        part = Clip.from_motion(path.name, _named_part(motion, section))
+        found = _search(drawing, [part], holds, frame_rate)
         if section.azimuth is None or section.elevation is None:
-            part = _named_part(motion, section)
-            best = _best(_search(drawing, [Clip.from_motion(path.name, part)], holds, frame_rate), path.name)
-            view = _view(best, section.start)
+            view = _view(_best(found, path.name), section.start)
         else:
-            stop = min(section.stop or len(motion.positions), len(motion.positions))
-            if section.start >= stop:
-                raise ValueError(f"clip.start: {path.name} has {len(motion.positions)} frames, got {section.start}")
-            view = View(section.start, stop, section.azimuth, section.elevation, section.mirrored, section.swapped)
+            view = _given_view(section, motion, found)
     notes += motion.report.notes if motion.report is not None else ()
     return Choice(path, motion, view, tuple(notes))
 
@@ -109,6 +110,21 @@ def _best(matches: Matches, name: str) -> Match:
 
 
 def _view(match: Match, offset: int = 0) -> View:
-    return View(
-        match.start + offset, match.stop + offset, match.azimuth, match.elevation, match.mirrored, match.swapped
-    )
+    times = tuple((match.times + offset).tolist())
+    start, stop = match.start + offset, match.stop + offset
+    return View(start, stop, match.azimuth, match.elevation, match.mirrored, match.swapped, times)
+
+
+def _given_view(section: ClipSection, motion: Motion, found: Matches) -> View:
+    """The view that ``section`` gives, with the times that the search found if it found about the same view."""
+    assert section.azimuth is not None
+    assert section.elevation is not None
+    stop = min(section.stop or len(motion.positions), len(motion.positions))
+    given = section.azimuth, section.elevation
+    view = View(section.start, stop, *given, section.mirrored, section.swapped)
+    for match in found.matches:
+        turn = (match.azimuth - section.azimuth + 180) % 360 - 180
+        same = (match.mirrored, match.swapped) == (section.mirrored, section.swapped)
+        if same and max(abs(turn), abs(match.elevation - section.elevation)) < _SAME_VIEW:
+            return dataclasses.replace(view, times=_view(match, section.start).times)
+    return view

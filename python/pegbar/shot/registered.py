@@ -32,7 +32,7 @@ class View:
     """Which part of a clip a drawing shows and from where: clip frames from ``start`` to before ``stop``, degrees.
 
     ``mirrored`` says that the clip's mirror image is meant, ``swapped`` that the drawing's left and right marks are
-    exchanged.
+    exchanged. ``times`` are the clip's frames at the drawings where they are known already; else a warp finds them.
     """
 
     start: int
@@ -41,6 +41,7 @@ class View:
     elevation: float
     mirrored: bool = False
     swapped: bool = False
+    times: tuple[float, ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -91,17 +92,22 @@ def register_clip(
     moments = np.arange(view.start, view.stop - 1 + 1e-9, clip.frame_rate / rate / _FINE)
     poses = sample_markers(clip.markers(marks.names), moments, rest_frame=clip.rest_frame)
     seen = OrthographicCamera.from_angles(view.azimuth, view.elevation).project(poses)
-    retiming = _retimed(marks, [seen], moments)
+    columns = None if view.times is None else np.interp(view.times, moments, np.arange(len(moments)))
+    retiming = _retimed(marks, [seen], moments, columns)
     track = _track(marks, clip, retiming, rate, CameraOptions(options.field_of_view, "free", "travel"))
     middles = np.nanmean(track.points, axis=1)
     shapes = poses - np.nanmean(poses, axis=1, keepdims=True)
     views = [camera.project(shapes + middle) for camera, middle in zip(track.cameras, middles, strict=True)]
-    retiming = _retimed(marks, views, moments)
+    columns = np.interp(retiming.times, moments, np.arange(len(moments)))
+    retiming = _retimed(marks, views, moments, columns)
     return retiming, _track(marks, clip, retiming, rate, options)
 
 
-def _retimed(marks: Marks, views: Sequence[Floats], moments: Floats) -> Retiming:
-    """The clip warped to the drawings; ``views`` are its poses (G, N, 2) as one or all of the drawings see them."""
+def _retimed(marks: Marks, views: Sequence[Floats], moments: Floats, columns: Floats | None) -> Retiming:
+    """The clip retimed to the drawings, near ``columns`` of ``moments`` or else by a time warp.
+
+    ``views`` are its poses (G, N, 2) as one or all of the drawings see them.
+    """
     limbs = [(marks.names.index(limb.start), marks.names.index(limb.end)) for limb in limbs_between(marks.names)]
     drawn = np.where(marks.seen[..., None], marks.places, np.nan)
     angles, trust = pose_descriptor(drawn, limbs), limb_trust(drawn, limbs)
@@ -112,9 +118,19 @@ def _retimed(marks: Marks, views: Sequence[Floats], moments: Floats) -> Retiming
         rows.append(pose_distance(angles[part], angle, a_trust=trust[part], b_trust=clip_trust))
     fine = np.concatenate(rows)
     cost = np.ascontiguousarray(fine[:, ::_FINE])
-    warp = time_warp(cost, open_begin=True, open_end=True, slope_limit=_SLOPE, holds=marks.holds)
-    times = _settled(fine, warp.times * _FINE, marks.holds)
-    return Retiming(cost, moments[::_FINE], warp, np.interp(times, np.arange(len(moments)), moments))
+    if columns is None:
+        warp = time_warp(cost, open_begin=True, open_end=True, slope_limit=_SLOPE, holds=marks.holds)
+        columns = warp.times * _FINE
+    columns = _settled(fine, columns, marks.holds)
+    times = np.interp(columns, np.arange(len(moments)), moments)
+    return Retiming(cost, moments[::_FINE], _as_warp(cost, columns / _FINE), times)
+
+
+def _as_warp(cost: Floats, columns: Floats) -> TimeWarp:
+    """The times that were settled on, as a warp to look at."""
+    frames = np.rint(columns).astype(np.int64).clip(0, cost.shape[1] - 1)
+    path = np.stack([np.arange(len(cost)), frames], axis=1)
+    return TimeWarp(path, float(cost[path[:, 0], path[:, 1]].sum()), frames, columns)
 
 
 def _settled(cost: Floats, times: Floats, holds: Floats) -> Floats:
