@@ -318,8 +318,8 @@ mod tests {
                     assert_eq!(first(&text), wanted, "{text}");
                 }
                 let whole = &word[..word.len() - behind - 1];
-                let wanted = whole.parse::<f64>().map(f64::to_bits).ok();
-                assert_eq!(first(&format!("{whole}\t1.5     ")), wanted, "{whole}");
+                let wanted = format!("{whole}0").parse::<f64>().map(f64::to_bits).ok();
+                assert_eq!(first(&format!("{whole}0\t1.5     ")), wanted, "{whole}0");
             }
         }
     }
