@@ -85,25 +85,26 @@ impl Skeleton<'_> {
         } else {
             scratch.turns.iter_mut().zip(values).for_each(|(turn, value)| *turn = value.sin_cos().into());
         }
-        let mut next = 0;
+        let mut column = 0;
         for joint in 0..self.parents.len() {
+            let (before, own) = scratch.world.split_at_mut(joint);
+            let base = usize::try_from(self.parents[joint]).map_or(&Pose::WORLD, |parent| &before[parent]);
             let mut offset = self.offsets[joint];
-            let base = usize::try_from(self.parents[joint]).map_or(Pose::WORLD, |parent| scratch.world[parent]);
             let rest = self.axes.get(joint);
             let mut axes = rest.map_or(base.axes, |rest| base.axes * *rest);
-            let end = next + self.counts[joint];
-            for (column, &value) in values.iter().enumerate().take(end).skip(next) {
+            let end = column + self.counts[joint];
+            while column < end {
                 match self.channels[column] {
-                    Channel::Position(axis) => offset[axis] = value,
+                    Channel::Position(axis) => offset[axis] = values[column],
                     // Much of a body stands still: half of all angles are 0 in many files.
-                    Channel::Rotation(_) if value == 0.0 => {}
+                    Channel::Rotation(_) if values[column] == 0.0 => {}
                     Channel::Rotation(axis) => turn(&mut axes, axis, scratch.turns[column]),
                 }
+                column += 1;
             }
-            next = end;
             let axes = rest.map_or(axes, |rest| axes * rest.transpose());
             let place = base.place + base.axes * offset;
-            scratch.world[joint] = Pose { place, axes };
+            own[0] = Pose { place, axes };
             places[joint] = place.to_array();
             turns[joint] = axes.transpose().to_cols_array();
         }

@@ -97,26 +97,25 @@ impl<'a> Words<'a> {
 
     /// Reads numbers up to the end, or to the first word that is none, which is then the next; at most `most`.
     pub fn numbers(&mut self, most: usize) -> Vec<f64> {
-        let mut found = Vec::with_capacity(most.min(self.left() / 2 + 1));
-        let mut place = self.place;
-        while found.len() < most {
-            while self.text.get(place).is_some_and(|byte| is_white(*byte)) {
+        let mut found = vec![0.0; most.min(self.left() / 2 + 1)];
+        let (mut place, mut count) = (self.place, 0);
+        for slot in &mut found {
+            while place < self.text.len() && is_white(self.text[place]) {
                 place += 1;
             }
             if let Some((value, length)) = plain_number(&self.text[place..]) {
-                found.push(value);
+                *slot = value;
                 place += length;
-                continue;
+            } else {
+                self.place = place;
+                let Some(Ok(value)) = self.word().map(number) else { break };
+                *slot = value;
+                place = self.place;
             }
-            self.place = place;
-            match self.word().map(number) {
-                Some(Ok(value)) => found.push(value),
-                Some(Err(_)) => break,
-                None => return found,
-            }
-            place = self.place;
+            count += 1;
         }
         self.place = place;
+        found.truncate(count);
         found
     }
 
@@ -319,8 +318,8 @@ mod tests {
                     assert_eq!(first(&text), wanted, "{text}");
                 }
                 let whole = &word[..word.len() - behind - 1];
-                let wanted = whole.parse::<f64>().map(f64::to_bits).ok();
-                assert_eq!(first(&format!("{whole}\t1.5     ")), wanted, "{whole}");
+                let wanted = format!("{whole}0").parse::<f64>().map(f64::to_bits).ok();
+                assert_eq!(first(&format!("{whole}0\t1.5     ")), wanted, "{whole}0");
             }
         }
     }
