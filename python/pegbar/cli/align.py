@@ -16,6 +16,8 @@ from pegbar.scene.alignment import Alignment
 from pegbar.shot.align_stage import AlignStage
 from pegbar.shot.plan import open_shot
 
+_ROOTS = {"in_place": "stays in place", "travel": "travels"}
+
 
 def align(
     shot: Path,
@@ -46,7 +48,7 @@ def summary(alignment: Alignment) -> str:
     usual, worst = float(np.median(alignment.errors)), int(np.argmax(alignment.errors))
     parts = [
         f"{alignment.mode} camera, {math.degrees(camera.field_of_view):.0f} degrees wide",
-        f"the clip's root {'stays in place' if alignment.root == 'in_place' else 'travels'}",
+        f"the clip's root {_ROOTS.get(alignment.root, 'travels in part')}",
         f"clip and drawing {usual:.1f} px apart (at most {alignment.errors[worst]:.1f})",
     ]
     guessed = int(alignment.estimated.sum())

@@ -9,6 +9,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from pegbar.io.alignment import read_alignment
 from pegbar.shot.align_stage import AlignStage
 from pegbar.shot.lift_stage import LiftStage
 from pegbar.shot.plan import open_shot
@@ -28,6 +29,8 @@ def lift(
     """
     stage = LiftStage(AlignStage(open_shot(shot, aligned=False)), overwrite)
     values, made = stage.run()
+    for note in read_alignment(stage.align.outputs()[0]).notes:
+        print(f"pegbar: warning: {note}", file=sys.stderr)
     if values["skeleton_reprojection_px"] > 3 * max(values["marker_reprojection_px"], 5.0):
         print("pegbar: warning: the clip's bones do not fit the drawn limbs well; see report.json", file=sys.stderr)
     slide = values["foot_slide_m_per_drawing"]

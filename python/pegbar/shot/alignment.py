@@ -71,7 +71,8 @@ def align_drawing(
     known = [index for index, name in enumerate(drawing.names) if name in there]
     names = tuple(drawing.names[index] for index in known)
     if len(names) < 4:
-        raise ValueError(f"clip: it has {len(names)} of the drawing's markers ({', '.join(names)}), want 4 or more")
+        found = ", ".join(names) or "none"
+        raise ValueError(f"clip: it has {len(names)} of the drawing's markers ({found}), want 4 or more")
     rate = frame_rate / float(holds.mean())
     places = drawing.markers[:, known]
     marks = Marks(places, drawing.visible[:, known] & np.isfinite(places).all(axis=2), names, holds, drawing.image_size)

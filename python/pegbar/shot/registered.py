@@ -100,7 +100,9 @@ def register_clip(
     seen = OrthographicCamera.from_angles(view.azimuth, view.elevation).project(poses)
     columns = None if view.times is None else np.interp(view.times, moments, np.arange(len(moments)))
     retiming = _retimed(marks, [seen], moments, columns)
-    track = _track(marks, clip, retiming, rate, CameraOptions(options.field_of_view, "free", "travel", level=options.level))
+    track = _track(
+        marks, clip, retiming, rate, CameraOptions(options.field_of_view, "free", "travel", level=options.level)
+    )
     middles = np.nanmean(track.points, axis=1)
     shapes = poses - np.nanmean(poses, axis=1, keepdims=True)
     views = [camera.project(shapes + middle) for camera, middle in zip(track.cameras, middles, strict=True)]
