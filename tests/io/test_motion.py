@@ -10,10 +10,9 @@ from pegbar.sample.dancer import dance
 from pegbar.scene.body import MARKERS
 from pegbar.scene.conventions import UNITS, up_rotation
 from tests.clips import bvh
-from tests.conftest import ROOT
+from tests.conftest import DATA
 from tests.skeletons import SCHEMES, person
 
-DATA = ROOT.parent / "shared" / "data"
 #: Clips in which the person walks or runs ahead, by what INDEX.csv says of them.
 AHEAD = re.compile(r"\b(walk|run|jog|jump, |forward jump)", re.IGNORECASE)
 
