@@ -8,8 +8,7 @@ import numpy as np
 import pygltflib as gltf
 from numpy.typing import ArrayLike, NDArray
 
-from pegbar import arrays
-from pegbar.export.rig import Rig, rig
+from pegbar.export.rig import Rig, frame_seconds, rig
 from pegbar.scene.motion import Motion
 
 Floats = NDArray[np.float64]
@@ -55,7 +54,7 @@ def glb(
     """
     bones = rig(motion)
     writer = _Writer(interpolation.upper(), name)
-    _joints(writer, bones, _seconds(motion, times))
+    _joints(writer, bones, frame_seconds(motion, times).astype(np.float32))
     _skin(writer, bones)
     document, roots = writer.document, [joint for joint, parent in enumerate(bones.parents) if parent < 0]
     document.nodes.append(gltf.Node(name=name, mesh=0, skin=0))
@@ -105,15 +104,6 @@ class _Writer:
         self.document.buffers.append(gltf.Buffer(byteLength=len(self._data)))
         self.document.set_binary_blob(bytes(self._data))
         return b"".join(self.document.save_to_bytes())
-
-
-def _seconds(motion: Motion, times: ArrayLike | None) -> NDArray[np.float32]:
-    frames = len(motion.positions)
-    given = np.arange(frames) / motion.frame_rate if times is None else times
-    seconds: NDArray[np.float32] = arrays.floats("times", given, (frames,)).astype(np.float32)
-    if (np.diff(seconds) <= 0).any() or seconds[0] < 0:
-        raise ValueError("times: want seconds from 0 on that rise from frame to frame")
-    return seconds
 
 
 def _joints(writer: _Writer, bones: Rig, seconds: NDArray[np.float32]) -> None:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
+from pegbar import arrays
 from pegbar.export.figure import Figure, capsule_figure
 from pegbar.lift.turning import swing
 from pegbar.scene.motion import Motion
@@ -76,6 +77,19 @@ def rig(motion: Motion) -> Rig:
         figure,
         carriers[figure.bone_of],
     )
+
+
+def frame_seconds(motion: Motion, times: ArrayLike | None) -> Floats:
+    """Return when each frame is shown (F,), in seconds: ``times``, or by the motion's rate where that is None.
+
+    Raises ValueError for times that are not from 0 on or do not rise from frame to frame.
+    """
+    frames = len(motion.positions)
+    given = np.arange(frames) / motion.frame_rate if times is None else times
+    seconds: Floats = arrays.floats("times", given, (frames,))
+    if (np.diff(seconds) <= 0).any() or (seconds < 0).any():
+        raise ValueError("times: want seconds from 0 on that rise from frame to frame")
+    return seconds
 
 
 def _local(motion: Motion, parents: NDArray[np.intp]) -> tuple[Floats, Floats]:

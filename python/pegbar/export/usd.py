@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pegbar import arrays
 from pegbar.errors import MissingExtraError
-from pegbar.export.rig import Rig, rig
+from pegbar.export.rig import Rig, frame_seconds, rig
 from pegbar.scene.motion import Motion
 
 if TYPE_CHECKING:
@@ -79,10 +78,7 @@ def _samples(
     motion: Motion, times: ArrayLike | None, rate: float, interpolation: str
 ) -> tuple[Floats, NDArray[np.intp]]:
     """Time codes, and the frame that is stored at each; a step is stored twice, since USD's joints interpolate."""
-    frames = len(motion.positions)
-    seconds = arrays.floats("times", np.arange(frames) / motion.frame_rate if times is None else times, (frames,))
-    if (np.diff(seconds) <= 0).any():
-        raise ValueError("times: want seconds that rise from frame to frame")
+    frames, seconds = len(motion.positions), frame_seconds(motion, times)
     codes, rows = seconds * rate, np.arange(frames)
     if interpolation == "step" and frames > 1:
         before = codes[1:] - 0.01 * np.diff(codes)
