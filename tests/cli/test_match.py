@@ -153,6 +153,16 @@ def test_wrong_use_is_one_line_and_exit_code_2(tmp_path, clips, capsys, words, s
     assert err.count("\n") == 1
 
 
+def test_what_cannot_be_written_or_used_is_said_before_the_search(tmp_path, clips, capsys, monkeypatch):
+    marks = annotate(tmp_path / "a.json", drawn(dance_clip(), 40, 30, 60))
+    monkeypatch.setattr("pegbar.cli.match.read_clips", lambda *_, **__: pytest.fail("searched"))
+    code, _, err = run(capsys, marks, clips, "--write", tmp_path / "none.toml")
+    assert code == 2
+    assert "none.toml" in err
+    code, _, err = run(capsys, marks, clips, "--frame-rate", "0")
+    assert (code, err) == (2, "pegbar: --frame-rate: want frames a second above 0, got 0.0\n")
+
+
 def test_the_second_search_reads_no_clip(tmp_path, clips, capsys, monkeypatch):
     marks = annotate(tmp_path / "a.json", drawn(dance_clip(), 40, 30, 60))
     _, first, _ = run(capsys, marks, clips)

@@ -111,6 +111,38 @@ def test_a_shot_without_a_clip_says_what_to_do(made, capsys):
         made.write_text(text)
 
 
+@pytest.mark.parametrize(
+    ("lines", "problem"),
+    [
+        ("stop = 17", "clip.stop: the clip has 16 frames, from 0 to 15; got 17"),
+        ("start = 16", "clip.start: the clip has 16 frames, from 0 to 15; got 16"),
+        ("start = 3\nstop = 6\nazimuth = 0\nelevation = 0", "frames 3 to 5 are too few for 16 drawings"),
+    ],
+)
+def test_parts_that_the_clip_does_not_have_are_said_by_their_keys(made, capsys, lines, problem):
+    text = made.read_text()
+    try:
+        made.write_text(text.replace('"clip.bvh"', f'"clip.bvh"\n{lines}'))
+        assert main(["align", str(made)]) == 2
+        assert problem in capsys.readouterr().err
+    finally:
+        made.write_text(text)
+
+
+def test_a_drawing_with_too_few_marks_is_named_with_its_joints(made, capsys):
+    path = made.parent / "annotation.json"
+    text = path.read_text()
+    marks = json.loads(text)
+    count = len(marks["markers"])
+    marks["frames"][4]["visible"] = [True] * 3 + [False] * (count - 3)
+    path.write_text(json.dumps(marks))
+    try:
+        assert main(["align", str(made), "--overwrite"]) == 2
+        assert "drawing 5: too few visible marks (pelvis, chest, neck), want 4 or more" in capsys.readouterr().err
+    finally:
+        path.write_text(text)
+
+
 def test_a_broken_alignment_is_named(tmp_path):
     (tmp_path / "a.npz").write_bytes(b"PK\x03\x04nonsense")
     with pytest.raises(FormatError, match=r"a\.npz"):

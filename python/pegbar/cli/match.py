@@ -20,6 +20,7 @@ from pegbar.report.match_table import describe_match, report_left_out, report_ma
 from pegbar.scene.body import MARKERS
 from pegbar.scene.drawing import Drawing
 from pegbar.shot.clip import clip_text, write_clip
+from pegbar.shot.load import load_shot
 
 # Drawings and matches on the contact sheet.
 _KEYS, _ROWS = 6, 8
@@ -49,6 +50,10 @@ def match(
     clips
         The folder of clips.
     """
+    if frame_rate is not None and not frame_rate > 0:
+        raise ValueError(f"--frame-rate: want frames a second above 0, got {frame_rate}")
+    if write is not None:
+        load_shot(write)
     drawing = read_annotations(annotations)
     chosen = _chosen(frames, len(drawing.markers))
     folder = _read(clips, index)

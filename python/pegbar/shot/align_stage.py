@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pegbar.errors import ShotError
+from pegbar.errors import DegenerateError, ShotError
 from pegbar.io import atomic
 from pegbar.io.alignment import read_alignment, write_alignment
 from pegbar.io.annotations_writer import write_annotations
@@ -78,6 +78,7 @@ class AlignStage:
         if self.is_done():
             return read_alignment(self.outputs()[0]), False
         rate = self.shot.settings.shot.frame_rate
+        self._check_marks(drawing)
         assert self.shot.settings.clip is not None
         choice = choose_clip(self.shot.settings.clip, self.shot.folder, drawing, holds, rate)
         alignment, retiming = align_drawing(drawing, choice.motion, choice.view, holds, rate, self._options())
@@ -134,6 +135,15 @@ class AlignStage:
             problems.append("the shot has no [clip]: name a path, or a folder of clips to look in (pegbar match helps)")
         if problems:
             raise ShotError(problems)
+
+    def _check_marks(self, drawing: Drawing) -> None:
+        """Refuse drawings with too few marks, by their numbers and the joints that they have."""
+        seen = drawing.visible & np.isfinite(drawing.markers).all(axis=2)
+        for number, row in zip(self.numbers, seen, strict=True):
+            if row.sum() < 4:
+                joints = ", ".join(name for name, there in zip(drawing.names, row, strict=True) if there) or "none"
+                name = self.shot.settings.drawing.annotations
+                raise DegenerateError(f"{name}: drawing {number}: too few visible marks ({joints}), want 4 or more")
 
     def _options(self) -> AlignOptions:
         section = self.shot.settings.align

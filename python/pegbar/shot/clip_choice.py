@@ -83,10 +83,11 @@ def read_clip(section: ClipSection, folder: Path, path: Path) -> Motion:
 
 
 def _named_part(motion: Motion, section: ClipSection) -> Motion:
-    part = motion.slice(section.start, section.stop)
-    if not len(part.positions):
-        raise ValueError(f"clip.start: the clip has {len(motion.positions)} frames, got {section.start}")
-    return part
+    frames = len(motion.positions)
+    for key, value, most in (("start", section.start, frames - 1), ("stop", section.stop, frames)):
+        if value is not None and value > most:
+            raise ValueError(f"clip.{key}: the clip has {frames} frames, from 0 to {frames - 1}; got {value}")
+    return motion.slice(section.start, section.stop)
 
 
 def _search(drawing: Drawing, clips: list[Clip], holds: NDArray[np.float64], frame_rate: float) -> Matches:
@@ -119,7 +120,7 @@ def _given_view(section: ClipSection, motion: Motion, found: Matches) -> View:
     """The view that ``section`` gives, with the times that the search found if it found about the same view."""
     assert section.azimuth is not None
     assert section.elevation is not None
-    stop = min(section.stop or len(motion.positions), len(motion.positions))
+    stop = section.stop or len(motion.positions)
     given = section.azimuth, section.elevation
     view = View(section.start, stop, *given, section.mirrored, section.swapped)
     for match in found.matches:

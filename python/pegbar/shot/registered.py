@@ -127,6 +127,9 @@ def _retimed(marks: Marks, views: Sequence[Floats], moments: Floats, columns: Fl
     fine = np.concatenate(rows)
     cost = np.ascontiguousarray(fine[:, ::_FINE])
     if columns is None:
+        if cost.shape[1] * _SLOPE < len(cost):
+            shown = f"{moments[0]:.0f} to {moments[-1]:.0f}"
+            raise ValueError(f"clip.start, clip.stop: frames {shown} are too few for {len(cost)} drawings")
         warp = time_warp(cost, open_begin=True, open_end=True, slope_limit=_SLOPE, holds=marks.holds)
         columns = warp.times * _FINE
     columns = _settled(fine, columns, marks.holds)
