@@ -139,9 +139,12 @@ def test_any_order_and_kind_of_input_gives_the_same_picture():
 @settings(max_examples=40)
 def test_far_points_are_clipped_in_peace(points, width):
     canvas = Canvas(7, 5)
-    canvas.polygon(points, (1, 2, 3))
-    canvas.polyline(points, width, (1, 2, 3))
-    assert np.abs(canvas.image()[canvas.image()[..., 3] > 127][:, :3] - (1.0, 2.0, 3.0)).max(initial=0) <= 1
+    color = (10, 100, 200)
+    canvas.polygon(points, color)
+    canvas.polyline(points, width, color)
+    image = canvas.image()
+    # Two layers round premultiplied colour and alpha to 8 bits; half coverage doubles what is lost.
+    assert np.abs(image[image[..., 3] > 127][:, :3] - np.array(color, float)).max(initial=0) <= 5
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from pegbar.scene.body import LIMBS, MARKERS
 
 Floats = NDArray[np.float64]
 Picture = NDArray[np.uint8]
-_CELL, _MARGIN, _WORDS = 220, 22, 300
+_CELL, _MARGIN, _WORDS = 220, 30, 300
 _PAPER, _GREY, _BLACK = (255, 255, 255, 255), (176, 176, 176), (40, 40, 40)
 _COLORS = {"left": (40, 100, 200), "right": (214, 84, 40)}
 _HIPS = [MARKERS.index("left_hip"), MARKERS.index("right_hip")]
@@ -94,9 +94,10 @@ def _scale(drawn: Floats) -> float:
 
 
 def _middle(points: Floats) -> Floats:
-    """The middle (n, 1, 2) of each pose's marks."""
+    """What goes into the middle of a cell, (n, 1, 2): each pose's hips, or the middle of its marks without them."""
     low, high = np.nanmin(points, axis=-2, keepdims=True), np.nanmax(points, axis=-2, keepdims=True)
-    middle: Floats = (low + high) / 2
+    hips = points[..., _HIPS, :].mean(axis=-2, keepdims=True)
+    middle: Floats = np.where(np.isfinite(hips), hips, (low + high) / 2)
     return middle
 
 
