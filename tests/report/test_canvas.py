@@ -135,6 +135,15 @@ def test_any_order_and_kind_of_input_gives_the_same_picture():
     assert all(np.array_equal(picture, pictures[0]) for picture in pictures)
 
 
+@pytest.mark.parametrize("place", [(-500, 5), (500, 5), (5, -300), (5, 400), (15, 11), (-3, 9)])
+def test_words_are_cut_at_the_rims(place):
+    small, large = Canvas(20, 12), Canvas(620, 512)
+    small.text(place, "Hallo", 9, (1, 2, 3))
+    large.text((place[0] + 300, place[1] + 250), "Hallo", 9, (1, 2, 3))
+    np.testing.assert_array_equal(small.image(), large.image()[250:262, 300:320])
+    assert small.image().any() == (abs(place[0]) < 20 and abs(place[1]) < 20)
+
+
 @given(hnp.arrays(float, (6, 2), elements=st.floats(-16000, 16000)), st.floats(0, 16000))
 @settings(max_examples=40)
 def test_far_points_are_clipped_in_peace(points, width):

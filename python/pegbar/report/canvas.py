@@ -102,11 +102,13 @@ class Canvas:
         # Hershey capitals are 21 units high at scale 1 in this face.
         scale, thickness = size / 21, max(1, round(size / 9))
         (width, height), below = cv2.getTextSize(letters, cv2.FONT_HERSHEY_SIMPLEX, scale, thickness)
-        x, y, rim = round(float(place[0])), round(float(place[1])), thickness + 1
-        left, top = max(x - rim, 0), max(y - height - rim, 0)
-        target = self._pixels[top : max(y + below + rim, 0), left : max(x + width + rim, 0)]
-        mask = np.zeros(target.shape[:2], np.uint8)
-        cv2.putText(mask, letters, (x - left, y - top), cv2.FONT_HERSHEY_SIMPLEX, scale, 255, thickness, cv2.LINE_AA)
+        rim = thickness + 1
+        mask = np.zeros((height + below + 2 * rim, width + 2 * rim), np.uint8)
+        cv2.putText(mask, letters, (rim, height + rim), cv2.FONT_HERSHEY_SIMPLEX, scale, 255, thickness, cv2.LINE_AA)
+        left, top = round(float(place[0])) - rim, round(float(place[1])) - height - rim
+        mask = mask[max(-top, 0) :, max(-left, 0) :]
+        target = self._pixels[max(top, 0) :, max(left, 0) :][: mask.shape[0], : mask.shape[1]]
+        mask = mask[: target.shape[0], : target.shape[1]]
         cover = (mask[..., None].astype(np.uint16) * alpha + 127) // 255
         _over(np.array([red, green, blue], np.uint16), cover, target)
 
