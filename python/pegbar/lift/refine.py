@@ -35,7 +35,8 @@ LEAST_JOLT, LEAST_DOUBT = 2e-3, 2e-2
 DOUBT = 2.0
 #: A rigid limb may jolt this many times more than the clip's does.
 LOOSER = 2.0
-
+#: Where limbs change their lengths, foreshortening is doubted by so many times that change.
+SQUASH = 2.0
 
 #: Drawn lengths change this much (relative) over time because poses differ from the clip's.
 POSE = 0.03
@@ -180,6 +181,8 @@ def _solve_level(figure: _Figure, links: list[Link], lengths: Floats | None, opt
         soft = _soft_depths(level, depths, found, figure.stretch).T
         figure.points[:, level.children] = _onto_rays(here, marked) + soft[..., None] * marked[1]
         return found
+    if figure.change > 0:
+        depths = np.ascontiguousarray(_soft_depths(level, depths, found, SQUASH * figure.stretch))
     tracks = LimbTracks(
         across=(_onto_rays(here, marked) - here).swapaxes(0, 1),
         rays=marked[1].swapaxes(0, 1),
