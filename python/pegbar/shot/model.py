@@ -131,6 +131,7 @@ class AlignSection(Section):
     smoothing: float = Field(default=0.0, ge=0, allow_inf_nan=False)
     root_smoothing: float = Field(default=0.25, ge=0, allow_inf_nan=False)
     level: float = Field(default=0.0, ge=0, allow_inf_nan=False)
+    proportions: Literal["auto", "drawn", "clip"] = "auto"
     ground: bool = False
     floor: float | None = Field(default=None, allow_inf_nan=False)
     use: Literal["auto", "always", "never"] = "auto"
