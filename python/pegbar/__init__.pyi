@@ -28,6 +28,11 @@ from .io.clip_folder import read_clips as read_clips
 from .io.joint_map import read_joint_map as read_joint_map
 from .io.joint_map import write_joint_map as write_joint_map
 from .io.motion import read_motion as read_motion
+from .layer.box_edges import LimbEdges as LimbEdges
+from .layer.box_edges import ink_edges as ink_edges
+from .layer.box_edges import label_edges as label_edges
+from .layer.boxes import LimbBoxes as LimbBoxes
+from .layer.boxes import limb_boxes as limb_boxes
 from .layer.composite import depth_composite as depth_composite
 from .layer.composite import holdout_matte as holdout_matte
 from .layer.composite import visible_matte as visible_matte
