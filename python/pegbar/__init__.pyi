@@ -22,6 +22,7 @@ from .errors import MissingExtraError as MissingExtraError
 from .errors import MissingFrameError as MissingFrameError
 from .errors import PegbarError as PegbarError
 from .errors import ShotError as ShotError
+from .errors import SimulationError as SimulationError
 from .io.annotations import read_annotations as read_annotations
 from .io.annotations_writer import write_annotations as write_annotations
 from .io.clip_folder import read_clips as read_clips
@@ -45,7 +46,6 @@ from .layer.segmentation import LabelMap as LabelMap
 from .layer.segmentation import grow_labels as grow_labels
 from .layer.segmentation import palette_labels as palette_labels
 from .layer.segmentation import segment_stick_figure as segment_stick_figure
-from .layer.volumes import TaperedCylinders as TaperedCylinders
 from .layer.volumes import collision_volumes as collision_volumes
 from .lift.backprojection import back_project as back_project
 from .lift.contact import ContactNoise as ContactNoise
@@ -65,6 +65,21 @@ from .scene.joints import map_joints as map_joints
 from .scene.mesh import Mesh as Mesh
 from .scene.motion import Motion as Motion
 from .scene.orthographic import OrthographicCamera as OrthographicCamera
+from .scene.volumes import TaperedCylinders as TaperedCylinders
+from .simulate.cache import MemoryCache as MemoryCache
+from .simulate.elements import Balls as Balls
+from .simulate.elements import Boxes as Boxes
+from .simulate.elements import Cloth as Cloth
+from .simulate.elements import Pin as Pin
+from .simulate.elements import Prop as Prop
+from .simulate.engine import simulate as simulate
+from .simulate.materials import ClothMaterial as ClothMaterial
+from .simulate.materials import Look as Look
+from .simulate.materials import RigidMaterial as RigidMaterial
+from .simulate.materials import Wind as Wind
 from .simulate.passes import Ink as Ink
 from .simulate.passes import Passes as Passes
 from .simulate.passes import render_passes as render_passes
+from .simulate.scene import Character as Character
+from .simulate.scene import PreRoll as PreRoll
+from .simulate.scene import SimulationScene as SimulationScene
