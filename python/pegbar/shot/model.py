@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254, "foot": 0.3048}
 
@@ -157,6 +157,51 @@ class LiftSection(Section):
     flips: list[FlipEntry] = []
 
 
+class WindSection(Section):
+    """``[secondary.wind]``: steady air and gusts."""
+
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    gusts: float = Field(default=0.5, ge=0, allow_inf_nan=False)
+    size: float = Field(default=1.5, gt=0, allow_inf_nan=False)
+
+
+class ElementEntry(BaseModel):
+    """One entry of ``elements``: a preset and what is to be different from it; the preset checks its own keys."""
+
+    model_config = ConfigDict(extra="allow", frozen=True, str_min_length=1)
+
+    preset: str
+    name: str | None = None
+    character: str | None = None
+
+    @property
+    def fields(self) -> dict[str, Any]:
+        """The preset's own keys."""
+        return dict(self.model_extra or {})
+
+
+def _as_entry(value: Any) -> Any:
+    return {"preset": value} if isinstance(value, str) else value
+
+
+class SecondarySection(Section):
+    """``[secondary]``: what is simulated around the drawn character, and how it is rendered."""
+
+    output: str = "secondary"
+    elements: list[Annotated[ElementEntry, BeforeValidator(_as_entry)]] = Field(default=[], min_length=1)
+    ground: Literal["auto", "none"] | Annotated[float, Field(allow_inf_nan=False)] = "auto"
+    gravity: float = Field(default=9.81, ge=0, allow_inf_nan=False)
+    wind: WindSection = WindSection()
+    pre_roll: int = Field(default=24, ge=0, le=10_000)
+    seed: int = Field(default=0, ge=0)
+    samples: int = Field(default=2, ge=1, le=8)
+    shadow: bool = True
+    separate: bool = False
+    misfit: float = Field(default=0.25, gt=0, allow_inf_nan=False)
+    characters: list[str] = []
+    frames: str = "secondary/final/final.####.png"
+
+
 class OutputSection(Section):
     """``[output]``: what is written, as patterns with a frame number."""
 
@@ -193,6 +238,7 @@ class ShotFile(Section):
     clip: ClipSection | None = None
     align: AlignSection = AlignSection()
     lift: LiftSection = LiftSection()
+    secondary: SecondarySection | None = None
     camera: CameraSection | None = None
     passes: PassesSection | None = None
     output: OutputSection = Field(default_factory=OutputSection)
