@@ -34,10 +34,14 @@ from .layer.box_edges import ink_edges as ink_edges
 from .layer.box_edges import label_edges as label_edges
 from .layer.boxes import LimbBoxes as LimbBoxes
 from .layer.boxes import limb_boxes as limb_boxes
+from .layer.carry import carry_marks as carry_marks
+from .layer.carry import moving_average as moving_average
 from .layer.composite import depth_composite as depth_composite
 from .layer.composite import holdout_matte as holdout_matte
 from .layer.composite import visible_matte as visible_matte
 from .layer.depth import limb_depth as limb_depth
+from .layer.dots import Dots as Dots
+from .layer.dots import find_dots as find_dots
 from .layer.matte import Matte as Matte
 from .layer.matte import ink_alpha as ink_alpha
 from .layer.matte import matte as matte

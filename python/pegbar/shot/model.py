@@ -70,6 +70,23 @@ class DrawingSection(Section):
         return self.unknown_colors == "error" or (self.unknown_colors == "auto" and self.tolerance == 0)
 
 
+class DotsSection(Section):
+    """``[dots]``: a layer of coloured dots that says where the joints are; the annotations are made of it."""
+
+    frames: str
+    joints: dict[Color, str] | str
+    limbs: dict[str, Color] = {}
+    tolerance: float = Field(60.0, ge=0, le=442, allow_inf_nan=False)
+    carry: Literal["flow", "straight", "none"] = "flow"
+    average: int = Field(1, ge=1)
+
+    @model_validator(mode="after")
+    def _averages_about_a_middle(self) -> DotsSection:
+        if self.average % 2 == 0:
+            raise ValueError(f"average: want an odd number of drawings, got {self.average}")
+        return self
+
+
 class CameraSection(Section):
     """``[camera]``: a still camera, in place of the one in the annotations."""
 
@@ -235,6 +252,7 @@ class ShotFile(Section):
 
     shot: ShotSection = Field(default_factory=ShotSection)
     drawing: DrawingSection
+    dots: DotsSection | None = None
     clip: ClipSection | None = None
     align: AlignSection = AlignSection()
     lift: LiftSection = LiftSection()
