@@ -8,6 +8,7 @@ mod composite;
 mod depth;
 mod descriptor;
 mod errors;
+mod geodesic;
 mod gif;
 mod grow;
 mod holdout;
@@ -41,6 +42,7 @@ mod _kernels {
     use crate::depth::limb_depth;
     #[pymodule_export]
     use crate::descriptor::pose_distance;
+    use crate::geodesic::geodesic_labels;
     #[pymodule_export]
     use crate::gif::pack_gif_frames;
     #[pymodule_export]

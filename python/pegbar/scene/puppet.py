@@ -69,6 +69,9 @@ class Puppet:
         The clip's frame of ``pose``.
     clip : str
         The clip's name.
+    fitted : bool
+        Whether ``pose`` is the clip's. False for a figure that no pose is like (an animal's): ``pose`` is then the
+        drawing itself, put upright before the camera, and the clip's bones turn its bones from there.
     bone_layer : (B,) int
         The layer on which a bone's own part of the figure is drawn.
     notes : tuple of str
@@ -102,6 +105,7 @@ class Puppet:
     image_size: tuple[int, int]
     pose_frame: int = 0
     clip: str = ""
+    fitted: bool = True
     bone_layer: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     notes: tuple[str, ...] = ()
 

@@ -15,9 +15,9 @@ class PuppetInput:
 
     ``image`` (H, W, 3 or 4) uint8 is the picture; ``mask`` (H, W) bool says where the figure is (None: nobody knows).
     ``names`` are its J joints, ``marks`` (J, 2) their pixels (NaN where a joint is not marked) and ``visible`` (J,)
-    whether they are seen. ``bones`` (B, 2) int are pairs of joints, parent and child, from the root outwards. ``drives``
-    is joint -> the clip's marker that moves it. ``source`` is what to call the picture in messages, ``photo`` whether
-    its silhouette has soft edges, ``notes`` what a user should know.
+    whether they are seen. ``bones`` (B, 2) int are pairs of joints, parent and child, from the root outwards.
+    ``drives`` is joint -> the clip's marker that moves it. ``source`` is what to call the picture in messages,
+    ``photo`` whether its silhouette has soft edges, ``notes`` what a user should know.
     """
 
     image: NDArray[np.uint8]
