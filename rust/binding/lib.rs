@@ -42,6 +42,7 @@ mod _kernels {
     use crate::depth::limb_depth;
     #[pymodule_export]
     use crate::descriptor::pose_distance;
+    #[pymodule_export]
     use crate::geodesic::geodesic_labels;
     #[pymodule_export]
     use crate::gif::pack_gif_frames;

@@ -28,7 +28,9 @@ _SAME, _OTHER = 30.0, 75.0
 KEEPS = ("near", "always", "never")
 
 
-def retarget(puppet: Puppet, drawn: ArrayLike, markers: ArrayLike, *, keep: str = "near", turning: bool = True) -> Floats:
+def retarget(
+    puppet: Puppet, drawn: ArrayLike, markers: ArrayLike, reference: ArrayLike, *, keep: str = "near"
+) -> Floats:
     """Return the drawn figure's joints (F, J, 3) in a clip's poses, its root where it was drawn.
 
     Parameters
@@ -38,12 +40,12 @@ def retarget(puppet: Puppet, drawn: ArrayLike, markers: ArrayLike, *, keep: str 
         The drawn figure in 3D, `pegbar.puppet.drawn_pose.drawn_pose`.
     markers : (F, J, 3) float
         For every joint the clip's marker that drives it, world metres; NaN for joints without one.
+    reference : (J, 3) float
+        The same in the clip's pose in which the figure was recognised.
     keep : {"near", "always", "never"}
-        What happens to the difference between a drawn limb's direction and the clip's in `Puppet.pose`: "near" keeps
+        What happens to the difference between a drawn limb's direction and the clip's in ``reference``: "near" keeps
         it up to 30 degrees and lets it go from 75 degrees on, "always" keeps it, "never" follows the clip. The body
-        (spine, head, shoulders, hips) always keeps it.
-    turning : bool
-        The differences turn with the way the person faces.
+        (spine, head, shoulders, hips) always keeps it. Differences turn with the way the person faces.
 
     Raises
     ------
@@ -56,8 +58,9 @@ def retarget(puppet: Puppet, drawn: ArrayLike, markers: ArrayLike, *, keep: str 
     rest = arrays.floats("drawn", drawn, (joints, 3))
     clip = arrays.floats("markers", markers, ("F", joints, 3), allow="nan")
     moved = moved_bones(puppet)
+    before = arrays.floats("reference", reference, (joints, 3), allow="nan")
     _refuse_missing(puppet, clip, moved)
-    turns = _facing_turns(puppet, clip) if turning else Rotation.identity(len(clip))
+    turns = Rotation.from_euler("y", facing_turn(puppet, clip, before), degrees=True)
     result = np.zeros(clip.shape)
     root = int(np.flatnonzero(puppet.parents < 0)[0])
     result[:, root] = rest[root]
@@ -65,8 +68,8 @@ def retarget(puppet: Puppet, drawn: ArrayLike, markers: ArrayLike, *, keep: str 
     for (parent, child), is_moved in zip(puppet.bones.tolist(), moved, strict=True):
         own = rest[child] - rest[parent]
         if is_moved:
-            before = _unit(puppet.pose[child] - puppet.pose[parent])
-            offset = _kept(_rotation_between(before, _unit(own)), keep, puppet.drives[puppet.names[child]])
+            seen = _unit(before[child] - before[parent])
+            offset = _kept(_rotations_between(seen, _unit(own)[None])[0], keep, puppet.drives[puppet.names[child]])
             directions = (turns * offset * turns.inv()).apply(_unit(clip[:, child] - clip[:, parent]))
             rotations[child] = _rotations_between(_unit(own), directions)
             along = directions * np.linalg.norm(own)
@@ -77,47 +80,28 @@ def retarget(puppet: Puppet, drawn: ArrayLike, markers: ArrayLike, *, keep: str 
     return result
 
 
-def clip_markers(puppet: Puppet, names: tuple[str, ...], markers: Floats) -> Floats:
-    """Return ``markers`` (F, N, 3) with ``names`` as one for each joint (F, J, 3), by `Puppet.drives`; else NaN."""
-    order = {name: place for place, name in enumerate(names)}
-    result = np.full((len(markers), len(puppet.names), 3), np.nan)
-    for joint, name in enumerate(puppet.names):
-        place = order.get(puppet.drives.get(name, ""))
-        if place is not None:
-            result[:, joint] = markers[:, place]
-    return result
-
-
-def body_scale(puppet: Puppet, drawn: Floats) -> float:
+def body_scale(puppet: Puppet, drawn: Floats, reference: Floats) -> float:
     """How large the drawn figure is beside the clip's: its legs' length by theirs, or all bones' where it has none."""
     moved = moved_bones(puppet)
-    legs = np.array(
-        [(puppet.drives.get(puppet.names[child]) or "").endswith(("knee", "foot")) for child in puppet.bones[:, 1]]
-    )
-    chosen = moved & legs if (moved & legs).any() else moved
-    parents, children = puppet.bones[chosen].T
+    ends = [puppet.drives.get(puppet.names[child], "") for child in puppet.bones[:, 1]]
+    legs = moved & np.array([end.endswith(("knee", "foot")) for end in ends], bool)
+    parents, children = puppet.bones[legs if legs.any() else moved].T
     drawn_length = np.linalg.norm(drawn[children] - drawn[parents], axis=1).sum()
-    length = np.linalg.norm(puppet.pose[children] - puppet.pose[parents], axis=1).sum()
+    length = np.linalg.norm(reference[children] - reference[parents], axis=1).sum()
     return float(drawn_length / length) if length > 0 else 1.0
 
 
-def facing_azimuths(puppet: Puppet, clip: Floats) -> Floats:
-    """Return the degrees (F,) by which the person has turned since `Puppet.pose`, unwrapped; 0 where unknown."""
+def facing_turn(puppet: Puppet, clip: Floats, reference: Floats) -> Floats:
+    """Return the degrees (F,) by which the person has turned since ``reference`` (J, 3), unwrapped; 0 where unknown."""
     driven = {puppet.drives[name]: joint for joint, name in enumerate(puppet.names) if name in puppet.drives}
-    poses = np.concatenate([puppet.pose[None], clip])
+    poses = np.concatenate([reference[None], clip])
     azimuths = facing({name: poses[:, joint] for name, joint in driven.items()})
-    if azimuths is None:
+    if azimuths is None or not np.isfinite(azimuths[0]):
         return np.zeros(len(clip))
     turned: Floats = azimuths[1:] - azimuths[0]
-    # The first step is from the drawn pose to any frame of the clip: the shorter way round.
     known = turned[np.isfinite(turned)]
-    if len(known):
-        turned = turned - 360 * np.round(known[0] / 360)
-    return np.nan_to_num(turned)
-
-
-def _facing_turns(puppet: Puppet, clip: Floats) -> Rotation:
-    return Rotation.from_euler("y", facing_azimuths(puppet, clip), degrees=True)
+    # From the reference to the first frame it is the shorter way round.
+    return np.nan_to_num(turned - 360 * np.round(known[0] / 360)) if len(known) else np.zeros(len(clip))
 
 
 def _kept(offset: Rotation, keep: str, marker: str) -> Rotation:
@@ -129,11 +113,6 @@ def _kept(offset: Rotation, keep: str, marker: str) -> Rotation:
     angle = math.degrees(offset.magnitude())
     share = np.clip((_OTHER - angle) / (_OTHER - _SAME), 0, 1)
     return offset ** float(share * share * (3 - 2 * share))
-
-
-def _rotation_between(first: Floats, second: Floats) -> Rotation:
-    """The smallest rotation that takes unit vector ``first`` (3,) to ``second`` (3,)."""
-    return _rotations_between(first, second[None])[0]
 
 
 def _rotations_between(first: Floats, second: Floats) -> Rotation:
