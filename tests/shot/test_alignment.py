@@ -49,7 +49,7 @@ def test_a_clip_seen_by_a_still_camera_is_found_and_met(walk):
         np.testing.assert_allclose(view.depth(alignment.clip[frame]), alignment.depths[frame], atol=1e-6)
     assert not alignment.estimated.any()
     assert retiming.cost.shape == (40, len(retiming.moments))
-    assert alignment.notes == ()
+    assert alignment.notes == alignment.warnings == ()
 
 
 @pytest.mark.parametrize(("change", "view"), [(mirrored, {"mirrored": True}), (exchanged, {"swapped": True})])
@@ -115,7 +115,7 @@ def test_a_clip_that_does_not_fit_is_told(walk):
     random = np.random.default_rng(0).normal(0, 60, drawing.markers.shape)
     wild = dataclasses.replace(drawing, markers=drawing.markers + random)
     alignment, _ = align_drawing(wild, walk, view_of(walk, 1, 200), np.ones(16), 24.0, AlignOptions(STILL))
-    assert any("the clip does not fit" in note for note in alignment.notes)
+    assert any("the clip does not fit" in warning for warning in alignment.warnings)
 
 
 def test_too_few_markers_are_refused(walk):

@@ -42,6 +42,11 @@ class Proportions:
     lengths: Floats
     swings: Floats
 
+    def describe(self, kinds: Sequence[str]) -> str:
+        """Return the lengths that differ much, in words."""
+        told = (f"{kind} {length:.1f}" for kind, length in zip(kinds, self.lengths, strict=True) if _is_much(length))
+        return ", ".join(told) or "none much"
+
 
 @dataclass(frozen=True, eq=False)
 class Body:
@@ -172,6 +177,10 @@ def _solved(ways: Floats, drawn: Floats, spread: float, share: float, kinds: Seq
         factors = np.linalg.solve(normal, weight * np.einsum("n,nak,na->k", trust, seen, drawn) + usual * spreads**-2.0)
         factors[:count] = factors[:count].clip(_SHORTEST, _LONGEST)
     return Proportions(factors[:count], 1 + factors[count:] / factors[:count])
+
+
+def _is_much(length: float) -> bool:
+    return not 0.8 < length < 1.25
 
 
 def _kind(name: str) -> str:

@@ -121,7 +121,11 @@ def register_clip(
     body = figure.body(retiming)
     jacobians = jacobians_of(track.matrices, track.points)
     proportions = own_proportions(body) if own else figure.proportions(body, jacobians)
-    return retiming, figure.track(body, proportions, options)
+    track = figure.track(body, proportions, options)
+    if own:
+        return retiming, track
+    note = f"the clip's body gets the drawn limb lengths ({proportions.describe(body.kinds)} times as long) and swings"
+    return retiming, replace(track, notes=(*track.notes, note))
 
 
 @dataclass(frozen=True, eq=False)
