@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "SOURCES",
     "composite_matte",
     "convert_srgb",
     "depth_composite",
@@ -35,6 +36,8 @@ __all__ = [
     "time_warp",
     "unpremultiply",
 ]
+
+SOURCES: str
 
 _Floats = NDArray[np.float32]
 _Doubles = NDArray[np.float64]
