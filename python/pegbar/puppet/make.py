@@ -9,14 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pegbar.puppet.inpaint import Completion, Method
-from pegbar.puppet.layers import Layer
+from pegbar.puppet.layers import Layer, cut_layers
+from pegbar.puppet.limbs import drawn_limbs
 from pegbar.puppet.mesh import layered_mesh, mesh_spacing
-from pegbar.puppet.parts import grow_parts
+from pegbar.puppet.parts import Parts, grow_parts
 from pegbar.puppet.texture import layer_textures, mask_alpha
 from pegbar.puppet.view import View, seen_pose
+from pegbar.scene.drawn_skeleton import limb_chains
 from pegbar.scene.motion import Motion
 from pegbar.scene.puppet import Puppet
 from pegbar.scene.puppet_input import PuppetInput
+
+#: The share of a limb's half width that outlines may take.
+_RIM = 0.3
 
 
 def make_puppet(
@@ -60,10 +65,12 @@ def make_puppet(
     mask = source.mask
     assert mask is not None
     parts = grow_parts(source, mask)
-    layers = [Layer("body", tuple(range(len(source.bones))), mask, mask)]
+    layers = cut_layers(source, mask, parts, drawn_limbs(source, parts, seen), seen.view, layer_order)
     spacing = mesh_spacing(float(mask.sum()))
     mesh = layered_mesh(source, layers, parts.bones, spacing)
-    textures = layer_textures(source.image[..., :3], figure_alpha(source), layers, completion)
+    textures = layer_textures(
+        source.image[..., :3], figure_alpha(source), layers, completion, rim=_RIM * _limb_radius(source, parts)
+    )
     return Puppet(
         names=source.names,
         marks=source.marks,
@@ -93,6 +100,12 @@ def figure_alpha(source: PuppetInput) -> NDArray[np.float32]:
         near = cv2.dilate(source.mask.view(np.uint8), np.ones((5, 5), np.uint8))
         return np.where(near, own, 0).astype(np.float32)
     return mask_alpha(source.mask)
+
+
+def _limb_radius(source: PuppetInput, parts: Parts) -> float:
+    """How thick the figure's limbs are: half their usual width, in pixels."""
+    limbs = [bone for chain in limb_chains(source.names, source.bones) for bone in chain]
+    return float(np.median(parts.radii[limbs or slice(None)]))
 
 
 def _bone_layers(layers: Sequence[Layer], count: int) -> NDArray[np.int64]:

@@ -17,6 +17,8 @@ Flags = NDArray[np.bool_]
 Coverage = NDArray[np.float32]
 #: How soft an outline that is known as a mask only is drawn: the spread in pixels of what makes its stairs smooth.
 _SOFTNESS = 0.7
+#: A pixel with less of the figure than this has some of the background's colour.
+_OPAQUE = 0.98
 
 
 def mask_alpha(mask: Flags) -> Coverage:
@@ -35,7 +37,12 @@ def bled(image: Pixels, known: Flags) -> Pixels:
 
 
 def layer_textures(
-    image: Pixels, alpha: Coverage, layers: Sequence[Layer], method: Method | Completion = "auto"
+    image: Pixels,
+    alpha: Coverage,
+    layers: Sequence[Layer],
+    method: Method | Completion = "auto",
+    *,
+    rim: float = 3.0,
 ) -> tuple[Pixels, ...]:
     """The texture (H, W, 4) of every layer, straight alpha, in the picture's coordinates.
 
@@ -49,15 +56,20 @@ def layer_textures(
         Front to back.
     method : see `complete`
         How what others hide is filled in.
+    rim : float
+        How far in from its border a layer's own colours begin, in pixels: nearer are outlines and blends with what is
+        beside it, which must not be carried into what is filled in.
     """
+    opaque = alpha >= _OPAQUE
     textures = []
     for layer in layers:
+        colors = bled(image, layer.drawn & opaque)
         hidden = layer.region & ~layer.drawn
-        # What lies beside the layer is no part of it: it must not be carried into the hidden part.
-        colors = bled(image, layer.drawn)
         if hidden.any() and layer.drawn.any():
-            colors = complete(colors, hidden, method, source=layer.drawn)
-            colors = bled(colors, layer.region)
+            deep = cv2.distanceTransform(layer.drawn.view(np.uint8), cv2.DIST_L2, 5)
+            sure = deep > min(rim, 0.5 * float(deep.max()))
+            filled = complete(bled(image, sure), layer.region & ~sure, method, source=sure)
+            colors = bled(np.where(hidden[..., None], filled, colors), layer.region & (opaque | hidden))
         coverage = np.minimum(alpha, mask_alpha(layer.region))
         textures.append(np.dstack([colors, np.rint(coverage * 255).astype(np.uint8)]))
     return tuple(textures)

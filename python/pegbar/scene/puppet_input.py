@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from pegbar.scene.drawing import Limb
+
 
 @dataclass(frozen=True, eq=False)
 class PuppetInput:
@@ -17,7 +19,8 @@ class PuppetInput:
     ``names`` are its J joints, ``marks`` (J, 2) their pixels (NaN where a joint is not marked) and ``visible`` (J,)
     whether they are seen. ``bones`` (B, 2) int are pairs of joints, parent and child, from the root outwards.
     ``drives`` is joint -> the clip's marker that moves it. ``source`` is what to call the picture in messages,
-    ``photo`` whether its silhouette has soft edges, ``notes`` what a user should know.
+    ``photo`` whether its silhouette has soft edges, ``notes`` what a user should know. ``segmentation`` (H, W, 3) uint8
+    is painted in the colours of ``limbs`` where the drawing comes with one.
     """
 
     image: NDArray[np.uint8]
@@ -30,6 +33,8 @@ class PuppetInput:
     source: str = "picture"
     photo: bool = False
     notes: tuple[str, ...] = ()
+    segmentation: NDArray[np.uint8] | None = None
+    limbs: tuple[Limb, ...] = ()
 
     @property
     def image_size(self) -> tuple[int, int]:
