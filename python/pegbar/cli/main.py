@@ -71,6 +71,11 @@ Aligns the shot first where that is out of date. Writes the clip's skeleton pose
 markers (CSV, npz), a sheet to look at and a report.
 
 Example: pegbar lift my_shot/shot.toml""",
+    "report": """Write one HTML page with overlays, plots and figures of every stage that has run.
+
+It opens offline, in any browser.
+
+Example: pegbar report my_shot/shot.toml""",
     "motion": """Look at motion capture clips.""",
     "demo": """Make a sample shot from nothing and run every stage on it.
 
