@@ -6,7 +6,6 @@ from numpy.typing import NDArray
 __all__ = [
     "Deformer",
     "SOURCES",
-    "SOURCES",
     "average_triangles",
     "composite_matte",
     "constrained_delaunay",

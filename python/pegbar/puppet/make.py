@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from pegbar.puppet.check import Pieces, checked
 from pegbar.puppet.inpaint import Completion, Method
 from pegbar.puppet.layers import Layer, cut_layers
 from pegbar.puppet.limbs import drawn_limbs
 from pegbar.puppet.mesh import layered_mesh, mesh_spacing
 from pegbar.puppet.parts import Parts, grow_parts
-from pegbar.puppet.texture import layer_textures, mask_alpha
+from pegbar.puppet.texture import layer_textures
 from pegbar.puppet.view import View, seen_pose
 from pegbar.scene.drawn_skeleton import limb_chains
 from pegbar.scene.motion import Motion
@@ -34,6 +34,7 @@ def make_puppet(
     field_of_view: float | None = None,
     completion: Method | Completion = "auto",
     background: bool = True,
+    pieces: Pieces = "join",
 ) -> Puppet:
     """Make a puppet of the figure in a picture: camera and pose from a clip, layers, mesh, textures.
 
@@ -55,21 +56,25 @@ def make_puppet(
         How hidden parts are filled in: see `pegbar.puppet.inpaint.complete`.
     background : bool
         Whether the picture behind the figure is completed as well.
+    pieces : {"join", "drop"}
+        What is done with pieces of the mask that no bone runs through.
 
     Raises
     ------
     ValueError
-        For a wrong option, or a clip that moves too few of the joints.
+        For a wrong option, joints outside the mask, or a clip that moves too few of the joints.
     """
+    source = checked(source, pieces=pieces)
     seen = seen_pose(source, motion, view=view, field_of_view=field_of_view)
+    assert source.mask is not None
+    assert source.alpha is not None
     mask = source.mask
-    assert mask is not None
     parts = grow_parts(source, mask)
     layers = cut_layers(source, mask, parts, drawn_limbs(source, parts, seen), seen.view, layer_order)
     spacing = mesh_spacing(float(mask.sum()))
     mesh = layered_mesh(source, layers, parts.bones, spacing)
     textures = layer_textures(
-        source.image[..., :3], figure_alpha(source), layers, completion, rim=_RIM * _limb_radius(source, parts)
+        source.image[..., :3], source.alpha, layers, completion, rim=_RIM * _limb_radius(source, parts)
     )
     return Puppet(
         names=source.names,
@@ -90,16 +95,6 @@ def make_puppet(
         notes=(*source.notes, *seen.notes),
         **vars(mesh),
     )
-
-
-def figure_alpha(source: PuppetInput) -> NDArray[np.float32]:
-    """The figure's coverage (H, W) in 0..1: the picture's own alpha, else the mask's with a smooth outline."""
-    assert source.mask is not None
-    if source.image.shape[2] == 4 and source.image[..., 3].min() < 128:
-        own = source.image[..., 3].astype(np.float32) / 255
-        near = cv2.dilate(source.mask.view(np.uint8), np.ones((5, 5), np.uint8))
-        return np.where(near, own, 0).astype(np.float32)
-    return mask_alpha(source.mask)
 
 
 def _limb_radius(source: PuppetInput, parts: Parts) -> float:

@@ -70,7 +70,7 @@ def _painted(source: PuppetInput, mask: Flags, grown: Labels, radii: Floats) -> 
     own = [children[limb.end] if limb.end in children and limb.start != "neck" else None for limb in limbs]
     own = [children["head"] if limb.end == "head" else bone for limb, bone in zip(limbs, own, strict=True)]
     others = [bone for bone in range(len(source.bones)) if bone not in own]
-    colors = [limb.color for limb in limbs]
+    colors = np.array([limb.color or (0, 0, 0) for limb in limbs], np.uint8)
     painted = palette_labels(source.segmentation, colors, np.arange(1, len(limbs) + 1), tolerance=0).labels
     painted = _kernels.grow_labels(np.where(mask, painted, 0).astype(np.uint8), mask.view(np.uint8), None)
     result = np.zeros_like(grown)
@@ -97,13 +97,13 @@ def bone_way(ends: Floats, inside: NDArray[np.float32]) -> NDArray[np.intp]:
     line = line.clip(0, np.array(inside.shape) - 1)
     within = inside[tuple(line.T)] > 0
     if within.all() or not (within[0] and within[-1]):
-        return line[within]
+        return np.asarray(line[within], np.intp)
     seeds = np.zeros(inside.shape, np.uint8)
     seeds[tuple(line[0])] = 1
     costs = np.where(inside > 0, 1 / np.maximum(inside, 0.5), np.inf).astype(np.float32)
     _, far = _kernels.geodesic_labels(seeds, costs, np.ones(1))
     if not np.isfinite(far[tuple(line[-1])]):
-        return line[within]
+        return np.asarray(line[within], np.intp)
     way = [line[-1]]
     while far[tuple(way[-1])] > 0:
         top, left = np.maximum(way[-1] - 1, 0)

@@ -20,7 +20,8 @@ class PuppetInput:
     whether they are seen. ``bones`` (B, 2) int are pairs of joints, parent and child, from the root outwards.
     ``drives`` is joint -> the clip's marker that moves it. ``source`` is what to call the picture in messages,
     ``photo`` whether its silhouette has soft edges, ``notes`` what a user should know. ``segmentation`` (H, W, 3) uint8
-    is painted in the colours of ``limbs`` where the drawing comes with one.
+    is painted in the colours of ``limbs`` where the drawing comes with one. ``alpha`` (H, W) float32 is the figure's
+    coverage, 0 to 1, where it is known better than from picture and mask.
     """
 
     image: NDArray[np.uint8]
@@ -35,6 +36,7 @@ class PuppetInput:
     notes: tuple[str, ...] = ()
     segmentation: NDArray[np.uint8] | None = None
     limbs: tuple[Limb, ...] = ()
+    alpha: NDArray[np.float32] | None = None
 
     @property
     def image_size(self) -> tuple[int, int]:
