@@ -8,6 +8,8 @@ mod composite;
 mod depth;
 mod descriptor;
 mod errors;
+mod geodesic;
+mod gif;
 mod grow;
 mod holdout;
 mod kinematics;
@@ -40,6 +42,10 @@ mod _kernels {
     use crate::depth::limb_depth;
     #[pymodule_export]
     use crate::descriptor::pose_distance;
+    #[pymodule_export]
+    use crate::geodesic::geodesic_labels;
+    #[pymodule_export]
+    use crate::gif::pack_gif_frames;
     #[pymodule_export]
     use crate::grow::grow_labels;
     #[pymodule_export]

@@ -12,6 +12,8 @@ pub mod depth;
 pub mod descriptor;
 pub mod error;
 pub mod fill;
+pub mod geodesic;
+pub mod gif;
 pub mod grow;
 pub mod holdout;
 pub mod ink;

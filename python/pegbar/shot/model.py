@@ -27,6 +27,7 @@ def _check_color(text: str) -> str:
 
 
 Color = Annotated[str, AfterValidator(_check_color)]
+Coordinate = Annotated[float, Field(allow_inf_nan=False)]
 
 
 class Section(BaseModel):
@@ -148,6 +149,7 @@ class AlignSection(Section):
     smoothing: float = Field(default=0.0, ge=0, allow_inf_nan=False)
     root_smoothing: float = Field(default=0.25, ge=0, allow_inf_nan=False)
     level: float = Field(default=0.0, ge=0, allow_inf_nan=False)
+    proportions: Literal["auto", "drawn", "clip"] = "auto"
     ground: bool = False
     floor: float | None = Field(default=None, allow_inf_nan=False)
     use: Literal["auto", "always", "never"] = "auto"
@@ -160,18 +162,39 @@ class FlipEntry(Section):
     drawings: str
 
 
+class HeldEntry(Section):
+    """A joint that stays at one place for a range of drawings: where it is in their mean, or ``at`` world metres."""
+
+    joint: str
+    drawings: str
+    at: tuple[Coordinate, Coordinate, Coordinate] | None = None
+
+
 class LiftSection(Section):
     """``[lift]``: how the drawing becomes a 3D animation, and what is written."""
 
     output: str = "lift"
     depth: Literal["clip", "lengths"] = "clip"
     stretch: bool = False
-    planted: bool = True
-    frame_rate: float | None = Field(default=None, gt=0, allow_inf_nan=False)
+    lengths: Literal["found", "clip"] | dict[str, Annotated[float, Field(gt=0, allow_inf_nan=False)]] = "found"
+    planted: bool | dict[Literal["left_foot", "right_foot"], str] = True
+    held: list[HeldEntry] = []
+    flips: list[FlipEntry] = []
+    skeleton: str | None = None
+    skeleton_joints: str | None = None
+    skeleton_size: Literal["own", "drawing"] = "own"
+    proportions: Literal["drawing", "skeleton"] | None = None
+    frame_rate: Literal["drawings"] | Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
     interpolation: Literal["step", "linear"] = "step"
     loop: bool = False
     formats: list[Literal["bvh", "glb", "usd", "csv", "npz"]] = ["bvh", "glb", "csv", "npz"]
-    flips: list[FlipEntry] = []
+    preview: Literal["gif", "png", "webp", "none"] = "gif"
+
+    @model_validator(mode="after")
+    def _lengths_need_their_depth(self) -> LiftSection:
+        if self.lengths != "found" and self.depth != "lengths":
+            raise ValueError('lengths: only depth = "lengths" takes lengths of limbs')
+        return self
 
 
 class WindSection(Section):
