@@ -50,6 +50,12 @@ from .lift.hidden import fill_hidden as fill_hidden
 from .lift.limbs import align_limbs as align_limbs
 from .lift.markers import drawn_lengths as drawn_lengths
 from .lift.markers import reconstruct_markers as reconstruct_markers
+from .puppet.deform import Deformer as Deformer
+from .puppet.deform import average_triangles as average_triangles
+from .puppet.deform import fit_triangles as fit_triangles
+from .puppet.render import render_mesh as render_mesh
+from .puppet.triangulation import Triangulation as Triangulation
+from .puppet.triangulation import triangulate as triangulate
 from .scene.camera import PerspectiveCamera as PerspectiveCamera
 from .scene.clip import Clip as Clip
 from .scene.clip_report import ClipReport as ClipReport

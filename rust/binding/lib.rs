@@ -5,6 +5,7 @@ mod arrays;
 mod bvh;
 mod color;
 mod composite;
+mod deform;
 mod depth;
 mod descriptor;
 mod errors;
@@ -22,6 +23,8 @@ mod rim;
 mod search;
 mod segment;
 mod signs;
+mod textured;
+mod triangulate;
 mod warp;
 
 use pyo3::prelude::*;
@@ -37,6 +40,8 @@ mod _kernels {
     use crate::color::convert_srgb;
     #[pymodule_export]
     use crate::composite::depth_composite;
+    #[pymodule_export]
+    use crate::deform::{Deformer, average_triangles, fit_triangles};
     #[pymodule_export]
     use crate::depth::limb_depth;
     #[pymodule_export]
@@ -69,6 +74,10 @@ mod _kernels {
     use crate::segment::segment_stick_figure;
     #[pymodule_export]
     use crate::signs::{length_costs, limb_depths};
+    #[pymodule_export]
+    use crate::textured::render_sheet;
+    #[pymodule_export]
+    use crate::triangulate::{constrained_delaunay, inside_rings};
     #[pymodule_export]
     use crate::warp::time_warp;
 }
