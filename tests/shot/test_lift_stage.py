@@ -10,7 +10,7 @@ from pegbar.cli.main import main
 from pegbar.io.alignment import read_alignment
 from pegbar.sample.shot import write_sample
 from pegbar.scene.body import MARKERS, bones_between
-from pegbar.shot.lifting import on_film
+from pegbar.shot.film import on_film
 from tests.motions import swaying
 
 

@@ -13,7 +13,7 @@ from pegbar.errors import FormatError
 from pegbar.io.atomic import complete_file
 from pegbar.scene.alignment import Alignment
 
-_TEXTS = ("names", "notes")
+_TEXTS = ("names", "notes", "warnings")
 
 
 def write_alignment(path: str | os.PathLike[str], alignment: Alignment) -> None:
