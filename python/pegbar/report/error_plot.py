@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,10 +25,9 @@ def error_plot(numbers: Sequence[int], errors: NDArray[np.float64], figure_heigh
     panel.set_xlabel("drawing")
     panel.set_ylabel("clip to marks, RMS (pixels)")
     share = panel.secondary_yaxis(
-        "right", functions=(lambda pixels: 100 * pixels / figure_height, lambda share: share * figure_height / 100)
+        "right", functions=(partial(np.multiply, 100 / figure_height), partial(np.multiply, figure_height / 100))
     )
     share.set_ylabel("% of the figure's height")
     panel.legend(loc="upper right")
-    canvas.draw()
-    picture: NDArray[np.uint8] = np.array(canvas.buffer_rgba())
-    return picture
+    canvas.draw()  # type: ignore[no-untyped-call]
+    return np.array(canvas.buffer_rgba(), np.uint8)  # type: ignore[no-untyped-call]
