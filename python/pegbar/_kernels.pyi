@@ -1,19 +1,26 @@
-from typing import Any
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "Deformer",
+    "SOURCES",
+    "average_triangles",
     "composite_matte",
+    "constrained_delaunay",
     "convert_srgb",
     "depth_composite",
     "fill_matte",
     "fill_polygon",
     "fit_poses",
+    "fit_triangles",
     "forward_kinematics",
+    "geodesic_labels",
     "grow_labels",
     "has_alpha",
     "ink_alpha",
+    "inside_rings",
     "length_costs",
     "lift_markers",
     "limb_depth",
@@ -25,6 +32,7 @@ __all__ = [
     "parse_bvh",
     "pose_distance",
     "render_passes",
+    "render_sheet",
     "resolve_passes",
     "rim_depth",
     "search_clips",
@@ -34,6 +42,8 @@ __all__ = [
     "time_warp",
     "unpremultiply",
 ]
+
+SOURCES: str
 
 _Floats = NDArray[np.float32]
 _Doubles = NDArray[np.float64]
@@ -74,6 +84,9 @@ def palette_labels(
     segmentation: NDArray[np.uint8], colors: NDArray[np.uint8], labels: NDArray[np.uint8], tolerance: float
 ) -> tuple[NDArray[np.uint8], int, list[int] | None]: ...
 def grow_labels(labels: NDArray[np.uint8], figure: NDArray[np.uint8], reach: float | None) -> NDArray[np.uint8]: ...
+def geodesic_labels(
+    seeds: NDArray[np.uint8], costs: NDArray[np.float32], paces: NDArray[np.float64]
+) -> tuple[NDArray[np.uint8], NDArray[np.float32]]: ...
 def ink_alpha(image: NDArray[np.uint8]) -> NDArray[np.float32]: ...
 def own_alpha(image: NDArray[np.uint8]) -> NDArray[np.float32]: ...
 def has_alpha(image: NDArray[np.uint8]) -> bool: ...
@@ -137,3 +150,29 @@ def search_clips(
     block: int,
 ) -> tuple[_Floats, NDArray[np.uint32]]: ...
 def segment_path(costs: _Doubles, steps: NDArray[np.uint32]) -> tuple[NDArray[np.uint32], float]: ...
+def fit_triangles(shapes: _Doubles, intermediate: _Doubles, triangles: NDArray[np.uint32]) -> _Doubles: ...
+def average_triangles(fitted: _Doubles, triangles: NDArray[np.uint32], count: int) -> _Doubles: ...
+
+@final
+class Deformer:
+    def __new__(
+        cls,
+        vertices: _Doubles,
+        triangles: NDArray[np.uint32],
+        handles: NDArray[np.uint32],
+        guides: NDArray[np.uint32],
+    ) -> Deformer: ...
+    def deform(self, positions: _Doubles, shapes: _Doubles | None, iterations: int, average: bool) -> _Doubles: ...
+
+def render_sheet(
+    vertices: _Doubles,
+    triangles: NDArray[np.uint32],
+    texture_coordinates: _Doubles,
+    texture: NDArray[np.uint8],
+    size: tuple[int, int],
+    samples: int,
+) -> NDArray[np.uint8]: ...
+def constrained_delaunay(
+    points: _Doubles, edges: NDArray[np.uint32]
+) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]: ...
+def inside_rings(places: _Doubles, rings: list[tuple[_Doubles, bool]]) -> NDArray[np.bool_]: ...

@@ -5,9 +5,12 @@ mod arrays;
 mod bvh;
 mod color;
 mod composite;
+mod deform;
 mod depth;
 mod descriptor;
 mod errors;
+mod geodesic;
+mod gif;
 mod grow;
 mod holdout;
 mod kinematics;
@@ -21,6 +24,8 @@ mod rim;
 mod search;
 mod segment;
 mod signs;
+mod textured;
+mod triangulate;
 mod warp;
 
 use pyo3::prelude::*;
@@ -28,6 +33,9 @@ use pyo3::prelude::*;
 /// The Rust kernels of pegbar. Strict and private: call the functions of the `pegbar` package instead.
 #[pymodule(gil_used = false)]
 mod _kernels {
+    /// Of which sources the extension was built.
+    #[pymodule_export]
+    const SOURCES: &str = env!("PEGBAR_SOURCES");
     #[pymodule_export]
     use crate::amc::parse_amc;
     #[pymodule_export]
@@ -37,9 +45,15 @@ mod _kernels {
     #[pymodule_export]
     use crate::composite::depth_composite;
     #[pymodule_export]
+    use crate::deform::{Deformer, average_triangles, fit_triangles};
+    #[pymodule_export]
     use crate::depth::limb_depth;
     #[pymodule_export]
     use crate::descriptor::pose_distance;
+    #[pymodule_export]
+    use crate::geodesic::geodesic_labels;
+    #[pymodule_export]
+    use crate::gif::pack_gif_frames;
     #[pymodule_export]
     use crate::grow::grow_labels;
     #[pymodule_export]
@@ -66,6 +80,10 @@ mod _kernels {
     use crate::segment::segment_stick_figure;
     #[pymodule_export]
     use crate::signs::{length_costs, limb_depths};
+    #[pymodule_export]
+    use crate::textured::render_sheet;
+    #[pymodule_export]
+    use crate::triangulate::{constrained_delaunay, inside_rings};
     #[pymodule_export]
     use crate::warp::time_warp;
 }

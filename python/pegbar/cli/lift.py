@@ -9,6 +9,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from pegbar.cli.align import print_remarks
 from pegbar.io.alignment import read_alignment
 from pegbar.shot.align_stage import AlignStage
 from pegbar.shot.lift_stage import LiftStage
@@ -29,7 +30,8 @@ def lift(
     """
     stage = LiftStage(AlignStage(open_shot(shot, aligned=False)), overwrite)
     values, made = stage.run()
-    for note in (*read_alignment(stage.align.outputs()[0]).notes, *values["notes"]):
+    print_remarks(read_alignment(stage.align.outputs()[0]))
+    for note in values["notes"]:
         print(f"pegbar: note: {note}", file=sys.stderr)
     parts = [
         f"markers {values['marker_reprojection_px']:.1f} px and skeleton {values['skeleton_reprojection_px']:.1f} px "

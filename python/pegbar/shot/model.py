@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254, "foot": 0.3048}
 
@@ -71,6 +71,23 @@ class DrawingSection(Section):
         return self.unknown_colors == "error" or (self.unknown_colors == "auto" and self.tolerance == 0)
 
 
+class DotsSection(Section):
+    """``[dots]``: a layer of coloured dots that says where the joints are; the annotations are made of it."""
+
+    frames: str
+    joints: dict[Color, str] | str
+    limbs: dict[str, Color] = {}
+    tolerance: float = Field(60.0, ge=0, le=442, allow_inf_nan=False)
+    carry: Literal["flow", "straight", "none"] = "flow"
+    average: int = Field(1, ge=1)
+
+    @model_validator(mode="after")
+    def _averages_about_a_middle(self) -> DotsSection:
+        if self.average % 2 == 0:
+            raise ValueError(f"average: want an odd number of drawings, got {self.average}")
+        return self
+
+
 class CameraSection(Section):
     """``[camera]``: a still camera, in place of the one in the annotations."""
 
@@ -132,6 +149,7 @@ class AlignSection(Section):
     smoothing: float = Field(default=0.0, ge=0, allow_inf_nan=False)
     root_smoothing: float = Field(default=0.25, ge=0, allow_inf_nan=False)
     level: float = Field(default=0.0, ge=0, allow_inf_nan=False)
+    proportions: Literal["auto", "drawn", "clip"] = "auto"
     ground: bool = False
     floor: float | None = Field(default=None, allow_inf_nan=False)
     use: Literal["auto", "always", "never"] = "auto"
@@ -179,6 +197,51 @@ class LiftSection(Section):
         return self
 
 
+class WindSection(Section):
+    """``[secondary.wind]``: steady air and gusts."""
+
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    gusts: float = Field(default=0.5, ge=0, allow_inf_nan=False)
+    size: float = Field(default=1.5, gt=0, allow_inf_nan=False)
+
+
+class ElementEntry(BaseModel):
+    """One entry of ``elements``: a preset and what is to be different from it; the preset checks its own keys."""
+
+    model_config = ConfigDict(extra="allow", frozen=True, str_min_length=1)
+
+    preset: str
+    name: str | None = None
+    character: str | None = None
+
+    @property
+    def fields(self) -> dict[str, Any]:
+        """The preset's own keys."""
+        return dict(self.model_extra or {})
+
+
+def _as_entry(value: Any) -> Any:
+    return {"preset": value} if isinstance(value, str) else value
+
+
+class SecondarySection(Section):
+    """``[secondary]``: what is simulated around the drawn character, and how it is rendered."""
+
+    output: str = "secondary"
+    elements: list[Annotated[ElementEntry, BeforeValidator(_as_entry)]] = Field(default=[], min_length=1)
+    ground: Literal["auto", "none"] | Annotated[float, Field(allow_inf_nan=False)] = "auto"
+    gravity: float = Field(default=9.81, ge=0, allow_inf_nan=False)
+    wind: WindSection = WindSection()
+    pre_roll: int = Field(default=24, ge=0, le=10_000)
+    seed: int = Field(default=0, ge=0)
+    samples: int = Field(default=2, ge=1, le=8)
+    shadow: bool = True
+    separate: bool = False
+    misfit: float = Field(default=0.25, gt=0, allow_inf_nan=False)
+    characters: list[str] = []
+    frames: str = "secondary/final/final.####.png"
+
+
 class OutputSection(Section):
     """``[output]``: what is written, as patterns with a frame number."""
 
@@ -212,9 +275,11 @@ class ShotFile(Section):
 
     shot: ShotSection = Field(default_factory=ShotSection)
     drawing: DrawingSection
+    dots: DotsSection | None = None
     clip: ClipSection | None = None
     align: AlignSection = AlignSection()
     lift: LiftSection = LiftSection()
+    secondary: SecondarySection | None = None
     camera: CameraSection | None = None
     passes: PassesSection | None = None
     output: OutputSection = Field(default_factory=OutputSection)
