@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from pegbar.errors import describe
-from pegbar.scene.body import HANGS_ON
 from pegbar.shot.align_stage import AlignStage
 from pegbar.shot.clip_choice import check_part, read_clip
 from pegbar.shot.plan import Shot
@@ -36,13 +35,7 @@ def _marks(shot: Shot) -> list[str]:
     drawing = stage.drawing()
     seen = drawing.visible & np.isfinite(drawing.markers).all(axis=2)
     few = [number for number, row in zip(stage.numbers, seen, strict=True) if row.sum() < 4]
-    problems = [
-        f"drawing {number}: fewer than four joints are marked and seen: pegbar align needs them" for number in few
-    ]
-    if strange := [name for name in drawing.names if name != "pelvis" and name not in HANGS_ON]:
-        known = ", ".join(strange)
-        problems.append(f"drawing.annotations: {known}: no canonical joint, so no clip moves it but one that has it")
-    return problems
+    return [f"drawing {number}: fewer than four joints are marked and seen: pegbar align needs them" for number in few]
 
 
 def _clip(shot: Shot) -> list[str]:
