@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pegbar.report.canvas import Canvas
-from pegbar.report.contact_sheet import over_paper
 from pegbar.report.lift_sheet import azimuth_of, draw_bones, lifted_names
 from pegbar.scene.alignment import Alignment
 from pegbar.scene.lifted import Lifted
@@ -60,7 +59,7 @@ def _overlay(
     for mark, guessed in zip(alignment.markers[frame, known], alignment.estimated[frame, known], strict=True):
         canvas.circle(scale * mark + (scale - 1) / 2, 3.0, _INK, width=1.0 if guessed else None)
     canvas.text((6, 16), f"drawing {label}", 10, (20, 20, 20))
-    return over_paper(canvas.image())
+    return canvas.image()[..., :3]
 
 
 def _scale(posed: Floats) -> float:
@@ -87,4 +86,4 @@ def _turntable(posed: Floats, names: tuple[str, ...], frame: int, azimuth: float
             canvas.polyline(view.project(ends), 1.0, _LINE)
     places = posed[frame] - middle
     draw_bones(canvas, view.project(places), view.depth(places), names, 5.0)
-    return over_paper(canvas.image())
+    return canvas.image()[..., :3]

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from pegbar.report.align_overlay import LEFT, MIDDLE, RIGHT
 from pegbar.report.canvas import Canvas
-from pegbar.report.contact_sheet import over_paper
 from pegbar.scene.alignment import Alignment
 from pegbar.scene.body import bones_between
 from pegbar.scene.lifted import Lifted
@@ -77,7 +76,7 @@ def _row(
     drawn.text((6, 16), f"drawing {label}", 10, (20, 20, 20))
     azimuth = azimuth_of(alignment, frame)
     known = [alignment.names.index(name) for name in lifted.names]
-    cells = [over_paper(drawn.image()), _stick("clip", azimuth, (lifted.names, alignment.clip[frame, known], 4.0))]
+    cells = [drawn.image()[..., :3], _stick("clip", azimuth, (lifted.names, alignment.clip[frame, known], 4.0))]
     figures = ((*posed, 5.0), (lifted.names, lifted.markers[frame], 1.5))
     cells += [_stick("result" if turn == 0 else f"turned {turn}", azimuth + turn, *figures) for turn in _TURNS]
     return np.concatenate(cells, axis=1)
@@ -93,4 +92,4 @@ def _stick(label: str, azimuth: float, *figures: tuple[tuple[str, ...], Floats, 
     for names, places, width in figures:
         draw_bones(canvas, view.project(places - middle), view.depth(places - middle), names, width)
     canvas.text((6, 16), label, 10, _GREY)
-    return over_paper(canvas.image())
+    return canvas.image()[..., :3]
