@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import cv2
 import numpy as np
@@ -23,12 +23,12 @@ _LINE, _INK = (214, 214, 204), (70, 70, 70)
 
 
 def preview_frames(
-    pictures: Sequence[Picture], labels: Sequence[str], alignment: Alignment, lifted: Lifted, shown: Sequence[int]
+    picture: Callable[[int], Picture], labels: Sequence[str], alignment: Alignment, lifted: Lifted, shown: Sequence[int]
 ) -> Iterator[Picture]:
     """Yield pictures (320, W, 3) uint8: the drawing, faded, under the posed skeleton, and that turning once about.
 
-    ``pictures``, ``labels`` are the F drawings and what they are called, ``shown`` (T,) which of them is seen in each
-    picture. On the turntable the floor's lines are half a metre apart and stand still in the world, so that feet that
+    ``picture`` gives a drawing's picture by its place, ``labels`` (F) name the drawings, ``shown`` (T,) says which of
+    them is seen in each frame. On the turntable the floor's lines are half a metre apart and stand still in the world, so that feet that
     slide are seen to.
     """
     names = lifted_names(lifted)
@@ -37,7 +37,7 @@ def preview_frames(
     size = _scale(posed)
     for place, frame in enumerate(shown):
         if frame not in overlays:
-            overlays = {frame: _overlay(pictures[frame], labels[frame], alignment, posed, names, frame)}
+            overlays = {frame: _overlay(picture(frame), labels[frame], alignment, posed, names, frame)}
         azimuth = azimuth_of(alignment, frame) + 360 * place / len(shown)
         yield np.concatenate([overlays[frame], _turntable(posed, names, frame, azimuth, size)], axis=1)
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from itertools import islice
+from collections.abc import Callable, Sequence
 
 import cv2
 import numpy as np
@@ -24,21 +23,20 @@ _ROWS = 12
 _GREY, _PAPER = (110, 110, 110), (250, 250, 246, 255)
 
 
-def lift_sheet(pictures: Iterable[Picture], labels: Sequence[str], alignment: Alignment, lifted: Lifted) -> Picture:
+def lift_sheet(
+    picture: Callable[[int], Picture], labels: Sequence[str], alignment: Alignment, lifted: Lifted
+) -> Picture:
     """Return rows of (260, W, 3) uint8 for at most 12 drawings: the drawing, the clip, the result from four directions.
 
     The result is the posed skeleton, broad, and the lifted markers, thin: bones that are not as long as drawn part
     from them. The first direction is the drawing's own camera's, level; then the figure is turned by 45 degrees each
-    time. ``labels`` (F) name the drawings.
+    time. ``picture`` gives a drawing's picture by its place, ``labels`` (F) name the drawings.
     """
     count = len(labels)
-    chosen = set(np.unique(np.linspace(0, count - 1, min(_ROWS, count)).round().astype(int)).tolist())
+    chosen = np.unique(np.linspace(0, count - 1, min(_ROWS, count)).round().astype(int)).tolist()
     names = lifted_names(lifted)
     posed = lifted.motion.markers(names)
-    rows = []
-    for frame, picture in enumerate(islice(pictures, count)):
-        if frame in chosen:
-            rows.append(_row(picture, labels[frame], alignment, lifted, (names, posed[frame]), frame))
+    rows = [_row(picture(i), labels[i], alignment, lifted, (names, posed[i]), i) for i in chosen]
     return np.concatenate(rows)
 
 
