@@ -171,7 +171,6 @@ def test_another_skeleton_is_posed_at_its_own_size(made, again, capsys):
     assert posed.names == rig.names
     thigh = np.linalg.norm(posed.positions[:, 4] - posed.positions[:, 3], axis=1)
     report = json.loads((folder / "report.json").read_text())
-    # read_motion takes the smallish rig for a person of 1.7 m in another unit: only proportions are sure.
     shin = np.linalg.norm(posed.positions[:, 5] - posed.positions[:, 4], axis=1)
     np.testing.assert_allclose(shin / thigh, np.linalg.norm(OFFSETS[5]) / np.linalg.norm(OFFSETS[4]), rtol=1e-3)
     names, markers, _ = markers_of(folder)
