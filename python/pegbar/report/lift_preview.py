@@ -25,11 +25,11 @@ _LINE, _INK = (214, 214, 204), (70, 70, 70)
 def preview_frames(
     picture: Callable[[int], Picture], labels: Sequence[str], alignment: Alignment, lifted: Lifted, shown: Sequence[int]
 ) -> Iterator[Picture]:
-    """Yield pictures (320, W, 3) uint8: the drawing, faded, under the posed skeleton, and that turning once about.
+    """Yield pictures (320, W, 3) uint8: the drawing, faded, under the posed skeleton; and that, turning once about.
 
     ``picture`` gives a drawing's picture by its place, ``labels`` (F) name the drawings, ``shown`` (T,) says which of
-    them is seen in each frame. On the turntable the floor's lines are half a metre apart and stand still in the world, so that feet that
-    slide are seen to.
+    them is seen in each frame. On the turntable the floor's lines are half a metre apart and stand still in the world,
+    so that feet that slide are seen to.
     """
     names = lifted_names(lifted)
     posed = lifted.motion.markers(names)
