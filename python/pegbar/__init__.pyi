@@ -50,6 +50,8 @@ from .layer.segmentation import LabelMap as LabelMap
 from .layer.segmentation import grow_labels as grow_labels
 from .layer.segmentation import palette_labels as palette_labels
 from .layer.segmentation import segment_stick_figure as segment_stick_figure
+from .layer.separate import Separated as Separated
+from .layer.separate import separate_volumes as separate_volumes
 from .layer.volumes import collision_volumes as collision_volumes
 from .lift.backprojection import back_project as back_project
 from .lift.contact import ContactNoise as ContactNoise
