@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "capsule_distances",
     "composite_matte",
     "convert_srgb",
     "depth_composite",
@@ -31,6 +32,7 @@ __all__ = [
     "search_clips",
     "segment_path",
     "segment_stick_figure",
+    "step_cloth",
     "stroke_polyline",
     "time_warp",
     "unpremultiply",
@@ -38,6 +40,7 @@ __all__ = [
 
 _Floats = NDArray[np.float32]
 _Doubles = NDArray[np.float64]
+_Indices = NDArray[np.uint32]
 _Pictures = tuple[_Floats, _Floats, _Floats, NDArray[np.uint16]]
 
 def convert_srgb(pixels: NDArray[np.float32], encode: bool) -> NDArray[np.float32]: ...
@@ -141,3 +144,17 @@ def search_clips(
     block: int,
 ) -> tuple[_Floats, NDArray[np.uint32]]: ...
 def segment_path(costs: _Doubles, steps: NDArray[np.uint32]) -> tuple[NDArray[np.uint32], float]: ...
+def capsule_distances(points: _Doubles, capsules: _Doubles) -> tuple[_Doubles, NDArray[np.uint32]]: ...
+def step_cloth(
+    made: tuple[_Doubles, _Indices, _Indices, _Doubles, _Indices, _Doubles, _Indices, _Doubles, _Indices, _Doubles],
+    acting: tuple[
+        tuple[float, float],
+        tuple[float, tuple[float, float, float]],
+        tuple[float, float, float, float, float],
+        int,
+    ],
+    air: _Doubles,
+    pins: tuple[_Indices, _Doubles],
+    capsules: _Doubles,
+    state: tuple[_Doubles, _Doubles],
+) -> None: ...
