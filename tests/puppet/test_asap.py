@@ -11,7 +11,7 @@ from tests.oracles import asap as oracle
 from tests.puppets import HALF, PIXEL, arm_puppet, turned_poses
 
 
-def width_at(mesh, puppet, column):
+def width_at(mesh, column):
     """How far apart the arm's two outlines are at one column of its mesh."""
     rows = mesh.reshape(5, 21, 2)
     return np.linalg.norm(rows[-1, column] - rows[0, column])
@@ -50,16 +50,25 @@ def test_every_vertex_is_where_the_paper_puts_it(inflation):
 
 def test_an_arm_towards_the_camera_keeps_its_width():
     puppet = arm_puppet(distance=4.0)
-    poses = turned_poses(puppet, [70.0])
+    poses = turned_poses(puppet, [50.0, 70.0, 80.0])
+    asap, arap = (deformed_meshes(puppet, puppet.pose, poses, Direction(shapes=shapes)) for shapes in ("asap", "arap"))
+    for column in (4, 6, 10, 14, 16):
+        points = poses[:, 0] + (poses[:, 2] - poses[:, 0]) * column / 20
+        wanted = 2 * HALF * 4.0 / puppet.camera.depth(points)
+        widths = [np.ptp(made.reshape(3, 5, 21, 2)[:, :, column, 1], axis=1) / wanted for made in (asap, arap)]
+        assert (widths[0] > 0.9).all()
+        assert (widths[0] < 1.1).all()
+        assert column < 14 or (widths[1] < 0.9).all()
+
+
+def test_a_figure_that_comes_nearer_grows_all_over():
+    puppet = arm_puppet(distance=4.0)
+    nearer = (puppet.pose + [0, 0, 2.0])[None]
     asap, arap = (
-        deformed_meshes(puppet, puppet.pose, poses, Direction(shapes=shapes))[0] for shapes in ("asap", "arap")
+        deformed_meshes(puppet, puppet.pose, nearer, Direction(shapes=shapes))[0] for shapes in ("asap", "arap")
     )
-    for column in (6, 10, 14):
-        nearer = 4.0 / puppet.camera.depth(poses[0, 0] + (poses[0, 2] - poses[0, 0]) * column / 20)
-        wanted = 2 * HALF * nearer
-        assert width_at(asap, puppet, column) > 0.9 * wanted
-        assert width_at(asap, puppet, column) < 1.1 * wanted
-        assert width_at(arap, puppet, column) < 0.8 * wanted
+    assert width_at(asap, 6) > 0.95 * 2 * (2 * HALF)
+    assert width_at(arap, 6) < 0.8 * 2 * (2 * HALF)
 
 
 def test_a_bone_that_points_into_the_camera_is_finite_and_continuous():
