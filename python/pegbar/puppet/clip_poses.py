@@ -19,9 +19,7 @@ USUAL_RATE = 30.0
 _HALVES = {"pelvis": "hip", "neck": "shoulder"}
 
 
-def clip_times(
-    motion: Motion, first: int | None, last: int | None, frame_rate: float | None
-) -> tuple[Floats, float]:
+def clip_times(motion: Motion, first: int | None, last: int | None, frame_rate: float | None) -> tuple[Floats, float]:
     """Return the clip's frames (F,), in fractions, at the pictures' times, and the pictures' rate.
 
     ``first`` and ``last`` count from 0 and are both shown; without them an inserted T-pose is left out. Without

@@ -178,9 +178,7 @@ def perform(puppet: Puppet, motion: Motion, direction: Direction | None = None) 
     )
 
 
-def _with_transition(
-    puppet: Puppet, rest: Floats, poses: Floats, way: Floats, count: int
-) -> tuple[Floats, Floats]:
+def _with_transition(puppet: Puppet, rest: Floats, poses: Floats, way: Floats, count: int) -> tuple[Floats, Floats]:
     """The poses and the way with ``count`` frames before them that lead there from the drawn pose."""
     if count < 1:
         return poses, way
