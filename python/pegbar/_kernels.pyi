@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 __all__ = [
     "Deformer",
+    "SOURCES",
     "average_triangles",
     "composite_matte",
     "constrained_delaunay",
@@ -43,6 +44,8 @@ __all__ = [
     "time_warp",
     "unpremultiply",
 ]
+
+SOURCES: str
 
 _Floats = NDArray[np.float32]
 _Doubles = NDArray[np.float64]

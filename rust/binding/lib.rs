@@ -34,6 +34,9 @@ use pyo3::prelude::*;
 /// The Rust kernels of pegbar. Strict and private: call the functions of the `pegbar` package instead.
 #[pymodule(gil_used = false)]
 mod _kernels {
+    /// Of which sources the extension was built.
+    #[pymodule_export]
+    const SOURCES: &str = env!("PEGBAR_SOURCES");
     #[pymodule_export]
     use crate::amc::parse_amc;
     #[pymodule_export]

@@ -43,6 +43,26 @@ class Layer:
     parent: int = -1
 
 
+@dataclass(frozen=True, eq=False)
+class LayerPlan:
+    """The layers of a figure front to back: ``names``, the ``bones`` drawn on each, and the ``joints`` they hang by.
+
+    The joint of the layer that all others hang on is -1.
+    """
+
+    names: tuple[str, ...]
+    bones: tuple[tuple[int, ...], ...]
+    joints: tuple[int, ...]
+
+    @property
+    def bone_layer(self) -> NDArray[np.int64]:
+        """The layer on which each bone is drawn (B,)."""
+        owner = np.zeros(sum(map(len, self.bones)), np.int64)
+        for index, bones in enumerate(self.bones):
+            owner[list(bones)] = index
+        return owner
+
+
 def layer_limbs(limbs: Sequence[DrawnLimb], view: View) -> tuple[list[DrawnLimb], list[DrawnLimb]]:
     """The limbs that have layers of their own: those before the body and those behind it, front to back.
 
@@ -63,23 +83,14 @@ def layer_limbs(limbs: Sequence[DrawnLimb], view: View) -> tuple[list[DrawnLimb]
     return before, [limb for limb in own if limb.hidden]
 
 
-def cut_layers(
-    source: PuppetInput,
-    mask: Flags,
-    parts: Parts,
-    limbs: Sequence[DrawnLimb],
-    view: View,
-    order: Sequence[str] | None = None,
-) -> list[Layer]:
-    """Cut the figure into layers, front to back.
+def plan_layers(
+    bone_count: int, limbs: Sequence[DrawnLimb], view: View, order: Sequence[str] | None = None
+) -> LayerPlan:
+    """Tell which layers a figure has, front to back, what is drawn on them and where they hang.
 
     Parameters
     ----------
-    source : PuppetInput
-    mask : (H, W) bool
-        Where the figure is.
-    parts : Parts
-        The bone each pixel belongs to.
+    bone_count : int
     limbs : sequence of DrawnLimb
         Nearest first.
     view : str
@@ -95,44 +106,47 @@ def cut_layers(
     before, behind = layer_limbs(limbs, view)
     bones = {limb.name: limb.bones for limb in (*before, *behind)}
     taken = {bone for chain in bones.values() for bone in chain}
-    bones[BODY] = tuple(bone for bone in range(len(source.bones)) if bone not in taken)
+    bones[BODY] = tuple(bone for bone in range(bone_count) if bone not in taken)
     names = [limb.name for limb in before] + [BODY] + [limb.name for limb in behind]
     if order is not None:
         if sorted(order) != sorted(names):
             raise ValueError(f"layer_order: want {', '.join(names)} in some order, got {', '.join(order)}")
         names = list(order)
     roots = {limb.name: limb.root for limb in limbs}
-    drawn = _drawn(source, mask, parts, [bones[name] for name in names], [roots.get(name) for name in names])
+    return LayerPlan(tuple(names), tuple(bones[name] for name in names), tuple(roots.get(name, -1) for name in names))
+
+
+def cut_layers(source: PuppetInput, mask: Flags, parts: Parts, plan: LayerPlan) -> list[Layer]:
+    """Cut the figure in ``mask`` (H, W) into the layers of ``plan``, front to back."""
     layers, before_it = [], np.zeros_like(mask)
-    for name, own in zip(names, drawn, strict=True):
-        hidden = _expected(source, parts, bones[name]) & before_it & ~own
-        region = _joined(own | hidden, source, bones[name])
-        joint, parent = (roots[name], names.index(BODY)) if name != BODY else (-1, -1)
-        layers.append(Layer(name, bones[name], own & region, region, joint, parent))
+    drawn = _drawn(source, mask, parts, plan)
+    for name, bones, joint, own in zip(plan.names, plan.bones, plan.joints, drawn, strict=True):
+        hidden = _expected(source, parts, bones) & before_it & ~own
+        region = _joined(own | hidden, source, bones)
+        parent = -1 if joint < 0 else plan.names.index(BODY)
+        layers.append(Layer(name, bones, own & region, region, joint, parent))
         before_it |= own
     return layers
 
 
-def _drawn(
-    source: PuppetInput, mask: Flags, parts: Parts, bones: Sequence[tuple[int, ...]], roots: Sequence[int | None]
-) -> list[Flags]:
+def _drawn(source: PuppetInput, mask: Flags, parts: Parts, plan: LayerPlan) -> list[Flags]:
     """The pixels that show each layer; a limb's reach into the body around the joint by which it hangs."""
-    drawn = [np.isin(parts.bones, np.array(own) + 1) for own in bones]
-    body = roots.index(None)
-    for index, root in enumerate(roots):
-        held = _capsules(source, bones[index], np.ones(len(source.bones)), mask)
-        pieces = _joined(drawn[index] | held, source, bones[index])
+    drawn = [np.isin(parts.bones, np.array(own) + 1) for own in plan.bones]
+    body = plan.names.index(BODY)
+    for index, (joint, bones) in enumerate(zip(plan.joints, plan.bones, strict=True)):
+        held = _capsules(source, bones, np.ones(len(source.bones)), mask)
+        pieces = _joined(drawn[index] | held, source, bones)
         # What hangs on no bone of the limb is the body's.
         drawn[body] |= drawn[index] & ~pieces
         drawn[index] &= pieces
-        if root is not None and index < body:
+        if joint >= 0 and index < body:
             # The limb keeps its outline around the joint, so that none is left behind on the body when it moves.
-            cap = _disc(mask, source.marks[root], parts.radii[bones[index][0]]) & drawn[body]
+            cap = _disc(mask, source.marks[joint], parts.radii[bones[0]]) & drawn[body]
             drawn[index] |= cap
             drawn[body] &= ~cap
-        elif root is not None and not source.visible[source.bones[list(bones[index]), 1]].all():
+        elif joint >= 0 and not source.visible[source.bones[list(bones), 1]].all():
             # What of a hidden limb seems to lie within the trunk is the trunk's.
-            within = drawn[index] & _hull(source, parts, bones[body])
+            within = drawn[index] & _hull(source, parts, plan.bones[body])
             drawn[index] &= ~within
             drawn[body] |= within
     return drawn

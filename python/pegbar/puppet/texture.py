@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
-from pegbar.puppet.inpaint import Completion, Method, complete
+from pegbar.puppet.inpaint import Completion, Method, bled, complete
 from pegbar.puppet.layers import Layer
 
 Pixels = NDArray[np.uint8]
@@ -19,6 +18,8 @@ Coverage = NDArray[np.float32]
 _SOFTNESS = 0.7
 #: A pixel with less of the figure than this has some of the background's colour.
 _OPAQUE = 0.98
+#: How far colour is carried beyond a layer's region, in pixels.
+_BLEED = 6
 
 
 def mask_alpha(mask: Flags) -> Coverage:
@@ -26,14 +27,6 @@ def mask_alpha(mask: Flags) -> Coverage:
     soft = cv2.GaussianBlur(mask.astype(np.float32), (0, 0), _SOFTNESS, borderType=cv2.BORDER_REPLICATE)
     alpha: Coverage = np.clip((soft - 0.5) * 1.5 + 0.5, 0, 1).astype(np.float32)
     return alpha
-
-
-def bled(image: Pixels, known: Flags) -> Pixels:
-    """The picture (H, W, 3) with the nearest known colour wherever it is not ``known``."""
-    if known.all() or not known.any():
-        return image
-    _, (rows, columns) = ndimage.distance_transform_edt(~known, return_indices=True)
-    return np.ascontiguousarray(image[rows, columns])
 
 
 def layer_textures(
@@ -71,5 +64,8 @@ def layer_textures(
             filled = complete(bled(image, sure), layer.region & ~sure, method, source=sure)
             colors = bled(np.where(hidden[..., None], filled, colors), layer.region & (opaque | hidden))
         coverage = np.minimum(alpha, mask_alpha(layer.region))
+        # Bilinear sampling reaches a pixel beyond what is covered, a smaller picture's a few more.
+        near = cv2.dilate(layer.region.view(np.uint8), np.ones((2 * _BLEED + 1,) * 2, np.uint8))
+        colors = np.where(near[..., None] > 0, colors, 0)
         textures.append(np.dstack([colors, np.rint(coverage * 255).astype(np.uint8)]))
     return tuple(textures)
