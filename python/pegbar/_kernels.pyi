@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
-    "Deformer",
     "SOURCES",
+    "Deformer",
     "average_triangles",
     "composite_matte",
     "constrained_delaunay",
@@ -26,8 +26,8 @@ __all__ = [
     "limb_depth",
     "limb_depths",
     "matte",
-    "own_alpha",
     "over_ground",
+    "own_alpha",
     "pack_gif_frames",
     "palette_labels",
     "parse_amc",
