@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 __all__ = [
     "Deformer",
+    "SOURCES",
     "average_triangles",
     "composite_matte",
     "constrained_delaunay",
@@ -15,6 +16,7 @@ __all__ = [
     "fit_poses",
     "fit_triangles",
     "forward_kinematics",
+    "geodesic_labels",
     "grow_labels",
     "has_alpha",
     "ink_alpha",
@@ -40,6 +42,8 @@ __all__ = [
     "time_warp",
     "unpremultiply",
 ]
+
+SOURCES: str
 
 _Floats = NDArray[np.float32]
 _Doubles = NDArray[np.float64]
@@ -80,6 +84,9 @@ def palette_labels(
     segmentation: NDArray[np.uint8], colors: NDArray[np.uint8], labels: NDArray[np.uint8], tolerance: float
 ) -> tuple[NDArray[np.uint8], int, list[int] | None]: ...
 def grow_labels(labels: NDArray[np.uint8], figure: NDArray[np.uint8], reach: float | None) -> NDArray[np.uint8]: ...
+def geodesic_labels(
+    seeds: NDArray[np.uint8], costs: NDArray[np.float32], paces: NDArray[np.float64]
+) -> tuple[NDArray[np.uint8], NDArray[np.float32]]: ...
 def ink_alpha(image: NDArray[np.uint8]) -> NDArray[np.float32]: ...
 def own_alpha(image: NDArray[np.uint8]) -> NDArray[np.float32]: ...
 def has_alpha(image: NDArray[np.uint8]) -> bool: ...

@@ -58,3 +58,14 @@ class MissingExtraError(PegbarError, ImportError):
 
     def __init__(self, purpose: str, extra: str) -> None:
         super().__init__(f'{purpose} needs a library that is not installed: pip install "pegbar[{extra}]"')
+
+
+class SimulationError(PegbarError, RuntimeError):
+    """A simulation that went wrong; the message names element and frame. Earlier frames stay in the cache."""
+
+    def __init__(self, element: str, frame: int, problem: str) -> None:
+        self.element, self.frame, self.problem = element, frame, problem
+        super().__init__(f"{element}: frame {frame}: {problem}")
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return SimulationError, (self.element, self.frame, self.problem)

@@ -9,6 +9,8 @@ mod deform;
 mod depth;
 mod descriptor;
 mod errors;
+mod geodesic;
+mod gif;
 mod grow;
 mod holdout;
 mod kinematics;
@@ -31,6 +33,9 @@ use pyo3::prelude::*;
 /// The Rust kernels of pegbar. Strict and private: call the functions of the `pegbar` package instead.
 #[pymodule(gil_used = false)]
 mod _kernels {
+    /// Of which sources the extension was built.
+    #[pymodule_export]
+    const SOURCES: &str = env!("PEGBAR_SOURCES");
     #[pymodule_export]
     use crate::amc::parse_amc;
     #[pymodule_export]
@@ -45,6 +50,10 @@ mod _kernels {
     use crate::depth::limb_depth;
     #[pymodule_export]
     use crate::descriptor::pose_distance;
+    #[pymodule_export]
+    use crate::geodesic::geodesic_labels;
+    #[pymodule_export]
+    use crate::gif::pack_gif_frames;
     #[pymodule_export]
     use crate::grow::grow_labels;
     #[pymodule_export]

@@ -15,6 +15,8 @@ pub mod elimination;
 pub mod error;
 pub mod fill;
 pub mod fit;
+pub mod geodesic;
+pub mod gif;
 pub mod grow;
 pub mod hinge;
 pub mod holdout;

@@ -286,6 +286,21 @@ def test_wrong_channels_are_named(channels, options, problem, file):
     assert not file.exists()
 
 
+def test_a_window_stores_a_part_and_reads_as_the_whole(file):
+    chance = np.random.default_rng(2)
+    beauty, depth = np.zeros((9, 12, 4), np.float32), np.full((9, 12), np.inf, np.float32)
+    beauty[2:6, 3:8], depth[2:6, 3:8] = chance.random((4, 5, 4)), chance.random((4, 5))
+    write_exr(file, {"": beauty, "Z": depth}, window=(3, 2, 7, 5))
+    read = read_passes(file)
+    np.testing.assert_array_equal(read.beauty, beauty.astype(np.float16))
+    np.testing.assert_array_equal(read.depth, depth)
+    for wrong in ((3, 2, 12, 5), (-1, 0, 3, 3), (4, 4, 3, 5)):
+        with pytest.raises(ValueError, match="window: want a part of 12 x 9"):
+            write_exr(file, {"": beauty, "Z": depth}, window=wrong)
+    with pytest.raises(ValueError, match="channels"):
+        write_exr(file, {"": beauty, "Z": depth[:5]}, window=(0, 0, 2, 2))
+
+
 def test_colour_half_conversion_is_numpys(file):
     values = np.random.default_rng(0).normal(size=(64, 64)).astype(np.float32)
     write_exr(file, {"R": values})

@@ -3,7 +3,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from pegbar import Drawing, PerspectiveCamera, read_motion
+from pegbar import Drawing, PerspectiveCamera, read_annotations, read_motion
+from pegbar.align.proportions import Body, Proportions
 from pegbar.scene.body import LIMBS, MARKERS
 from pegbar.scene.mirror import exchanged, mirrored
 from pegbar.shot.alignment import AlignOptions, align_drawing
@@ -48,7 +49,7 @@ def test_a_clip_seen_by_a_still_camera_is_found_and_met(walk):
         np.testing.assert_allclose(view.depth(alignment.clip[frame]), alignment.depths[frame], atol=1e-6)
     assert not alignment.estimated.any()
     assert retiming.cost.shape == (40, len(retiming.moments))
-    assert alignment.notes == ()
+    assert alignment.notes == alignment.warnings == ()
 
 
 @pytest.mark.parametrize(("change", "view"), [(mirrored, {"mirrored": True}), (exchanged, {"swapped": True})])
@@ -114,7 +115,7 @@ def test_a_clip_that_does_not_fit_is_told(walk):
     random = np.random.default_rng(0).normal(0, 60, drawing.markers.shape)
     wild = dataclasses.replace(drawing, markers=drawing.markers + random)
     alignment, _ = align_drawing(wild, walk, view_of(walk, 1, 200), np.ones(16), 24.0, AlignOptions(STILL))
-    assert any("the clip does not fit" in note for note in alignment.notes)
+    assert any("the clip does not fit" in warning for warning in alignment.warnings)
 
 
 def test_too_few_markers_are_refused(walk):
@@ -128,3 +129,53 @@ def test_too_few_markers_are_refused(walk):
     )
     with pytest.raises(ValueError, match="2 of the drawing's markers"):
         align_drawing(few, walk, view_of(walk, 1, 200), np.ones(4), 24.0, AlignOptions())
+
+
+def short_legged(motion, frames):
+    """`motion` with legs of half their length that swing half as far: what an artist draws is not a person."""
+    body = Body(MARKERS, motion.markers(MARKERS)[frames], 24.0)
+    legs = np.array([0.5 if kind in ("knee", "foot") else 1.0 for kind in body.kinds])
+    return body.drawn(Proportions(legs, legs))
+
+
+def seen_from(positions, points):
+    """Azimuth and elevation of a camera from the figure, in degrees."""
+    back = (positions - points.mean(axis=1)).mean(axis=0)
+    return np.degrees([np.arctan2(back[0], back[2]), np.arcsin(back[1] / np.linalg.norm(back))])
+
+
+@pytest.mark.parametrize("proportions", ["auto", "drawn"])
+def test_short_legs_and_steps_do_not_turn_the_view(walk, proportions):
+    frames = np.arange(40, 240, 5)
+    points = short_legged(walk, frames)
+    drawing = dataclasses.replace(drawn(walk, frames), markers=camera().project(points))
+    truth = seen_from(np.repeat(camera().position[None], 40, axis=0), points)
+    errors = {}
+    for kind in (proportions, "clip"):
+        options = AlignOptions(CameraOptions(mode="static", root="auto", proportions=kind))
+        alignment, _ = align_drawing(drawing, walk, view_of(walk, 1, 300), np.ones(40), 24.0, options)
+        found = seen_from(np.array([view.position for view in alignment.cameras]), alignment.clip)
+        errors[kind] = np.abs(found - truth).max(), np.median(alignment.errors)
+    assert errors[proportions][0] < 4 < errors["clip"][0]
+    assert errors[proportions][1] < 0.3 * errors["clip"][1]
+
+
+@pytest.mark.parametrize(
+    ("folder", "clip", "view", "nearer"),
+    [
+        ("morevna_side_walk", "bvh/cmu_07_01.bvh", View(1, 317, 107.0, 12.0), "left"),
+        ("kenney_male_person_walk", "asfamc/07_05-walk.amc", View(0, 300, 326.0, -7.0), "right"),
+    ],
+)
+def test_near_limbs_of_drawn_walks_are_nearer(test_data, folder, clip, view, nearer):
+    drawing = read_annotations(test_data / "annotated" / folder / "annotation.json")
+    motion = read_motion(test_data / "mocap" / clip)
+    count = len(drawing.markers)
+    alignment, _ = align_drawing(drawing, motion, view, np.ones(count), 24.0 if count > 8 else 12.0, AlignOptions())
+    left, right = (
+        alignment.depths[:, [alignment.names.index(f"{side}_{j}") for j in ("hip", "knee", "shoulder")]]
+        for side in ("left", "right")
+    )
+    is_nearer = left < right if nearer == "left" else right < left
+    assert is_nearer.mean() > 0.8
+    assert abs(seen_from(np.array([view.position for view in alignment.cameras]), alignment.clip)[1]) < 20

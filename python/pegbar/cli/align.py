@@ -34,12 +34,19 @@ def align(
     stage = AlignStage(open_shot(shot, aligned=False), overwrite)
     with progress("align", len(stage.numbers)) as advance:
         alignment, made = stage.run(lambda _done, _all: advance())
-    for note in alignment.notes:
-        print(f"pegbar: warning: {note}", file=sys.stderr)
+    print_remarks(alignment)
     print(f"align: {summary(alignment)}")
     where = os.path.relpath(stage.folder)
     print(f"align: {len(stage.numbers)} drawings {'aligned' if made else 'up to date'}, in {where}")
     return 0
+
+
+def print_remarks(alignment: Alignment) -> None:
+    """Print what was assumed, and what looks wrong."""
+    for note in alignment.notes:
+        print(f"pegbar: note: {note}", file=sys.stderr)
+    for warning in alignment.warnings:
+        print(f"pegbar: warning: {warning}", file=sys.stderr)
 
 
 def summary(alignment: Alignment) -> str:

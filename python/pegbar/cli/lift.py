@@ -9,6 +9,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from pegbar.cli.align import print_remarks
 from pegbar.io.alignment import read_alignment
 from pegbar.shot.align_stage import AlignStage
 from pegbar.shot.lift_stage import LiftStage
@@ -29,18 +30,18 @@ def lift(
     """
     stage = LiftStage(AlignStage(open_shot(shot, aligned=False)), overwrite)
     values, made = stage.run()
-    for note in read_alignment(stage.align.outputs()[0]).notes:
-        print(f"pegbar: warning: {note}", file=sys.stderr)
-    if values["skeleton_reprojection_px"] > 3 * max(values["marker_reprojection_px"], 5.0):
-        print("pegbar: warning: the clip's bones do not fit the drawn limbs well; see report.json", file=sys.stderr)
-    slide = values["foot_slide_m_per_drawing"]
+    print_remarks(read_alignment(stage.align.outputs()[0]))
+    for note in values["notes"]:
+        print(f"pegbar: note: {note}", file=sys.stderr)
     parts = [
         f"markers {values['marker_reprojection_px']:.1f} px and skeleton {values['skeleton_reprojection_px']:.1f} px "
         "from the drawing",
         f"skeleton {100 * values['skeleton_to_markers_m']:.1f} cm from the markers",
+        f"limbs change by {values['limb_length_residual']:.1%}",
+        f"{100 * values['to_clip_m']:.0f} cm from the clip",
     ]
-    if slide is not None:
-        parts.append(f"standing feet slide {1000 * slide:.0f} mm a drawing")
+    if (slide := values["foot_slide_worst_m"]) is not None:
+        parts.append(f"standing feet slide {1000 * slide:.0f} mm at most")
     print(f"lift: {', '.join(parts)}")
     files = ", ".join(path.name for path in stage.outputs())
     print(f"lift: {'written' if made else 'up to date'}: {files}, in {os.path.relpath(stage.folder)}")

@@ -52,6 +52,12 @@ Reads the joint marks and every BVH, AMC and C3D file in a folder and the folder
 a table, and says so when nothing fits. Left and right mixed up in the drawing, and mirrored motions, are found too.
 
 Example: pegbar match my_shot/annotation.json mocap -o my_shot/match --write my_shot/shot.toml""",
+    "dots": """Read joint marks from a layer of coloured dots, one colour a joint.
+
+Writes the shot's annotations. Drawings without dots get marks carried from the ones before and after them, along with
+the drawing's own motion.
+
+Example: pegbar dots my_shot/shot.toml""",
     "align": """Find the camera of every drawing, and put the drawn joints into 3D.
 
 Retimes the clip of the shot's [clip] section to the drawings (or finds one in its folder), registers cameras, and
@@ -65,6 +71,20 @@ Aligns the shot first where that is out of date. Writes the clip's skeleton pose
 markers (CSV, npz), a sheet to look at and a report.
 
 Example: pegbar lift my_shot/shot.toml""",
+    "animate": """Let a drawn or photographed figure perform a motion capture clip.
+
+Joints are found beside the picture: AnimatedDrawings' char_cfg.yaml, our annotations or COCO keypoints; a mask as well.
+Writes GIF, APNG, WebP, numbered PNG files, and with pegbar[video] MP4, ProRes 4444 (.mov) or WebM. Several pictures
+stand in one scene; several clips are performed in a row. With a folder to write to, every picture performs every clip.
+
+Example: pegbar animate texture.png --clip walk.bvh -o walk.gif --size 500x500
+
+Example: pegbar animate drawings --clip clips -o animations --format mp4""",
+    "report": """Write one HTML page with overlays, plots and figures of every stage that has run.
+
+It opens offline, in any browser.
+
+Example: pegbar report my_shot/shot.toml""",
     "motion": """Look at motion capture clips.""",
     "demo": """Make a sample shot from nothing and run every stage on it.
 

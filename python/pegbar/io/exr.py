@@ -120,7 +120,13 @@ def read_passes(
     return RenderedPasses(beauty, depth)
 
 
-def write_exr(path: _Path, channels: Mapping[str, ArrayLike], *, compression: str = "zip") -> None:
+def write_exr(
+    path: _Path,
+    channels: Mapping[str, ArrayLike],
+    *,
+    compression: str = "zip",
+    window: tuple[int, int, int, int] | None = None,
+) -> None:
     """Write an EXR file, complete or not at all.
 
     Parameters
@@ -133,11 +139,13 @@ def write_exr(path: _Path, channels: Mapping[str, ArrayLike], *, compression: st
         as half unless they exceed its range, everything else as float; uint32 stays uint32.
     compression : str
         none, rle, zips, zip, piz, pxr24, b44, b44a, dwaa or dwab.
+    window : (left, top, right, bottom), optional
+        First and last column and row of what is stored (the data window); outside there is nothing when it is read.
 
     Raises
     ------
     ValueError
-        For channels that differ in size, are no numbers, or an unknown compression.
+        For channels that differ in size, are no numbers, a window outside the picture, or an unknown compression.
     OSError
         When the file cannot be written; it names ``path``.
     """
@@ -147,6 +155,10 @@ def write_exr(path: _Path, channels: Mapping[str, ArrayLike], *, compression: st
         raise ValueError(f"compression: want one of {', '.join(_COMPRESSIONS)}, got {compression!r}")
     name = "NO" if compression == "none" else compression.upper()
     header = {"compression": getattr(OpenEXR, f"{name}_COMPRESSION"), "type": OpenEXR.scanlineimage}
+    if window is not None:
+        (height, width), channels = _cut(channels, window)
+        header["dataWindow"] = np.array(window[:2], np.int32), np.array(window[2:], np.int32)
+        header["displayWindow"] = np.zeros(2, np.int32), np.array([width - 1, height - 1], np.int32)
     # To memory first: the library's own file writing loses the reason of a failure.
     stream = io.BytesIO()
     try:
@@ -155,6 +167,17 @@ def write_exr(path: _Path, channels: Mapping[str, ArrayLike], *, compression: st
     except (RuntimeError, TypeError) as error:
         raise OSError(errno.EIO, f"OpenEXR cannot encode the channels: {error}", os.fspath(path)) from error
     atomic.write_bytes(path, stream.getbuffer())
+
+
+def _cut(channels: Mapping[str, ArrayLike], window: tuple[int, int, int, int]) -> tuple[Any, dict[str, NDArray[Any]]]:
+    """Height and width of the whole picture, and the part of every channel that is in ``window``."""
+    sizes = {np.shape(value)[:2] for value in channels.values()}
+    if len(sizes) != 1 or len(min(sizes)) < 2:
+        raise ValueError(f"channels: want one size for all, got {sorted(sizes)}")
+    (left, top, right, bottom), (height, width) = window, min(sizes)
+    if not (0 <= left <= right < width and 0 <= top <= bottom < height):
+        raise ValueError(f"window: want a part of {width} x {height} pixels, got {window}")
+    return min(sizes), {n: np.asarray(value)[top : bottom + 1, left : right + 1] for n, value in channels.items()}
 
 
 def _split(channels: Mapping[str, ArrayLike]) -> dict[str, NDArray[Any]]:

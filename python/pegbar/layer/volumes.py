@@ -2,29 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pegbar import arrays
 from pegbar.errors import DegenerateError
 from pegbar.scene.camera import metric
+from pegbar.scene.volumes import TaperedCylinders
 
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class TaperedCylinders:
-    """V limbs in F frames: the axis from ``start`` to ``end`` (F, V, 3) and the radii (F, V) there, world metres.
-
-    A limb whose box or markers are not known in a frame is NaN there.
-    """
-
-    start: Floats
-    end: Floats
-    start_radius: Floats
-    end_radius: Floats
 
 
 def collision_volumes(boxes: ArrayLike, matrices: ArrayLike, points: ArrayLike, limbs: ArrayLike) -> TaperedCylinders:

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pegbar import arrays
 from pegbar.lift.attachments import Attachments, attach
+from pegbar.lift.retarget import follow, rest_pose, shared_markers
 from pegbar.lift.turning import best_rotation, steady_swing
 from pegbar.scene.motion import Motion
 
@@ -21,8 +22,15 @@ Floats = NDArray[np.float64]
 _BACK = 0.05
 
 
-def joint_angles(markers: ArrayLike, names: Sequence[str], motion: Motion, *, stretch: bool = False) -> Motion:
-    """Pose the skeleton of ``motion`` so that its joints come onto ``markers`` (2009, section 3.6).
+def joint_angles(
+    markers: ArrayLike,
+    names: Sequence[str],
+    motion: Motion,
+    *,
+    stretch: bool = False,
+    skeleton: Motion | None = None,
+) -> Motion:
+    """Pose the skeleton of ``motion``, or another, so that its joints come onto ``markers`` (2009, section 3.6).
 
     Parameters
     ----------
@@ -35,6 +43,10 @@ def joint_angles(markers: ArrayLike, names: Sequence[str], motion: Motion, *, st
     stretch : bool
         True: bones change their length so that every joint with a marker lies on it. False: bones keep their length,
         and markers are met within the error of the limbs' lengths.
+    skeleton : Motion, optional
+        Another skeleton, from whose rest pose (`Motion.rest`, else the first frame) the result is posed, at its own
+        size. It turns about its bones as the clip does; the clip may then be points (C3D), which leaves the rest
+        pose's twist. Markers that it lacks are left out.
 
     Returns
     -------
@@ -45,7 +57,7 @@ def joint_angles(markers: ArrayLike, names: Sequence[str], motion: Motion, *, st
     ------
     ValueError
         For another number of frames than the motion's, a marker that the motion lacks, a number that is not finite,
-        or a motion without a skeleton.
+        a motion without a skeleton, or a skeleton that shares fewer than 4 canonical markers with the motion.
 
     Examples
     --------
@@ -58,6 +70,11 @@ def joint_angles(markers: ArrayLike, names: Sequence[str], motion: Motion, *, st
     [0.5, 0.5, 0.0]
     """
     wanted = arrays.floats("markers", markers, (len(motion.positions), len(names), 3))
+    if skeleton is not None:
+        motion.markers(names)
+        motion = _as_clip(motion, skeleton)
+        kept = [place for place, name in enumerate(names) if name in {*motion.known_markers, *motion.names}]
+        wanted, names = wanted[:, kept], [names[place] for place in kept]
     tree = attach(motion, names)
     turns = np.empty_like(motion.rotations)
     places = np.empty_like(motion.positions)
@@ -71,7 +88,18 @@ def joint_angles(markers: ArrayLike, names: Sequence[str], motion: Motion, *, st
         if stretch and (marker := tree.on[joint]) is not None:
             places[:, joint] = wanted[:, marker]
         turns[:, joint] = _bone(tree, joint, wanted, motion, places[:, joint], turns[:, parent])
-    return Motion(motion.names, motion.parents, places, turns @ motion.rotations, motion.frame_rate, motion.rest_frame)
+    return motion.changed(positions=places, rotations=turns @ motion.rotations)
+
+
+def _as_clip(motion: Motion, skeleton: Motion) -> Motion:
+    """The ``skeleton`` in the clip's frames, posed first as the clip's rest pose (of points: its first frame) is."""
+    names = shared_markers(motion, skeleton)
+    points = len(motion.parents) > 1 and max(motion.parents) < 0
+    clip_rest = motion.slice(0, 1) if points else rest_pose(motion)
+    if not len(clip_rest.positions):
+        return follow(motion, skeleton, rest_pose(skeleton).rotations[0])
+    start = joint_angles(clip_rest.markers(names), names, rest_pose(skeleton))
+    return follow(motion, skeleton, start.rotations[0])
 
 
 def _root(tree: Attachments, joint: int, wanted: Floats, motion: Motion) -> tuple[Floats, Floats]:
@@ -90,8 +118,9 @@ def _root(tree: Attachments, joint: int, wanted: Floats, motion: Motion) -> tupl
 
 def _bone(tree: Attachments, joint: int, wanted: Floats, motion: Motion, place: Floats, parent_turn: Floats) -> Floats:
     """Rotation of a joint: onto one marker by a swing, onto several with least squares; with none its parent's."""
-    below = tree.below[joint]
-    if not below:
+    below, parent = tree.below[joint], motion.parents[joint]
+    # Where the joint above points at the same marker already, only wrong lengths would be left to bend for.
+    if not below or (len(below) == 1 and below == tree.below[parent] and motion.parents[parent] >= 0):
         return parent_turn
     source = tree.anchors[:, below] - motion.positions[:, joint][:, None]
     target = wanted[:, below] - place[:, None]

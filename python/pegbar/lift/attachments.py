@@ -33,7 +33,7 @@ class Attachments:
 
 def attach(motion: Motion, names: Sequence[str]) -> Attachments:
     """Return how the markers ``names`` sit on the skeleton of ``motion``; ValueError where one cannot."""
-    order = _parents_first(motion.parents)
+    order = parents_first(motion.parents)
     anchors = motion.markers(names)
     index = {name: joint for joint, name in enumerate(motion.names)}
     own: list[list[int]] = [[] for _ in order]
@@ -60,7 +60,8 @@ def attach(motion: Motion, names: Sequence[str]) -> Attachments:
     )
 
 
-def _parents_first(parents: Sequence[int]) -> tuple[int, ...]:
+def parents_first(parents: Sequence[int]) -> tuple[int, ...]:
+    """Return the joints in an order in which each stands after its parent; ValueError for points and for circles."""
     if len(parents) > 1 and max(parents) < 0:
         raise ValueError("motion: it has no skeleton, only points, so it has no joint angles")
     order: list[int] = []

@@ -1,1 +1,1 @@
-"""From a picture to a moving figure: triangulation, deformation, rendering (2007 paper, s6-7)."""
+"""From one picture to a figure that moves (2007 paper, s6-7): template, layers, textures, deformation, rendering."""

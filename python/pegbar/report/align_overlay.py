@@ -14,25 +14,33 @@ Picture = NDArray[np.uint8]
 # Left is blue and right is red, as in `pegbar motion plot`; what has no side is grey.
 LEFT, RIGHT, MIDDLE = (40, 90, 220), (215, 50, 40), (110, 110, 110)
 _GHOST = 110
+_READABLE = 540
 
 
 def align_overlay(picture: Picture, alignment: Alignment, frame: int, label: str) -> Picture:
     """Return a drawing with what was found for it, and the same joints in 3D beside it, (H, W + H, 4) uint8.
 
+    A drawing with sides shorter than 540 pixels is enlarged, by a whole number, so that lines and words can be read.
+
     On the drawing, faded: broad pale lines are the clip seen by the camera, thin lines the drawn joints; a ring is a
     joint that the drawing hides. On the right the drawn joints in 3D (thin) and the clip (broad) from the side, the
     camera to the left, the floor as a line. ``label`` is written above.
     """
+    times = max(1, -(-_READABLE // max(picture.shape[:2])))
+    picture = np.ascontiguousarray(picture.repeat(times, axis=0).repeat(times, axis=1))
     height, width = picture.shape[:2]
     canvas = Canvas(width + height, height, (255, 255, 255, 255))
     canvas.paste(picture, 0, 0)
     canvas.polygon([(-1, -1), (width, -1), (width, height), (-1, height)], (255, 255, 255, 140))
     canvas.polygon([(width, -1), (width + height, -1), (width + height, height), (width, height)], (244, 244, 240))
     unit = max(height, width) / 540
-    seen = alignment.cameras[frame].project(alignment.clip[frame])
+    seen, drawn = (
+        times * places + (times - 1) / 2
+        for places in (alignment.cameras[frame].project(alignment.clip[frame]), alignment.markers[frame])
+    )
     _skeleton(canvas, alignment, seen, 5 * unit, _GHOST)
-    _skeleton(canvas, alignment, alignment.markers[frame], 1.5 * unit, 255)
-    _dots(canvas, alignment.markers[frame], alignment.estimated[frame], unit)
+    _skeleton(canvas, alignment, drawn, 1.5 * unit, 255)
+    _dots(canvas, drawn, alignment.estimated[frame], unit)
     _from_the_side(canvas, alignment, frame, width, height, unit)
     canvas.text((6 * unit, 16 * unit), label, 10 * unit, (20, 20, 20))
     return canvas.image()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from itertools import islice
 
 import cv2
 import numpy as np
@@ -13,41 +14,83 @@ from pegbar.report.canvas import Canvas
 from pegbar.report.contact_sheet import over_paper
 from pegbar.scene.alignment import Alignment
 from pegbar.scene.body import bones_between
+from pegbar.scene.lifted import Lifted
 from pegbar.scene.orthographic import OrthographicCamera
 
 Floats = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 _SIDE = 260
 _TURNS = (0, 45, 90, 135)
+_ROWS = 12
+_GREY, _PAPER = (110, 110, 110), (250, 250, 246, 255)
 
 
-def lift_row(picture: Picture, alignment: Alignment, markers: Floats, names: Sequence[str], frame: int) -> Picture:
-    """Return one row (260, W, 3) uint8 for a drawing: it, the clip, and the lifted markers from four directions.
+def lift_sheet(pictures: Iterable[Picture], labels: Sequence[str], alignment: Alignment, lifted: Lifted) -> Picture:
+    """Return rows of (260, W, 3) uint8 for at most 12 drawings: the drawing, the clip, the result from four directions.
 
-    ``markers`` (N, 3) are the lifted ones of ``names``. The first direction is the drawing's own camera's, level; then
-    the figure is turned by 45 degrees each time.
+    The result is the posed skeleton, broad, and the lifted markers, thin: bones that are not as long as drawn part
+    from them. The first direction is the drawing's own camera's, level; then the figure is turned by 45 degrees each
+    time. ``labels`` (F) name the drawings.
     """
-    height = _SIDE
-    small = over_paper(cv2.resize(picture, (round(picture.shape[1] * height / picture.shape[0]), height)))
-    known = [alignment.names.index(name) for name in names]
+    count = len(labels)
+    chosen = set(np.unique(np.linspace(0, count - 1, min(_ROWS, count)).round().astype(int)).tolist())
+    names = lifted_names(lifted)
+    posed = lifted.motion.markers(names)
+    rows = []
+    for frame, picture in enumerate(islice(pictures, count)):
+        if frame in chosen:
+            rows.append(_row(picture, labels[frame], alignment, lifted, (names, posed[frame]), frame))
+    return np.concatenate(rows)
+
+
+def lifted_names(lifted: Lifted) -> tuple[str, ...]:
+    """Return the markers that the posed skeleton has too."""
+    return tuple(name for name in lifted.names if name in {*lifted.motion.known_markers, *lifted.motion.names})
+
+
+def azimuth_of(alignment: Alignment, frame: int) -> float:
+    """Return where the drawing's camera stands, in degrees about the vertical."""
     back = -alignment.cameras[frame].rotation[2]
-    azimuth = float(np.degrees(np.arctan2(back[0], back[2])))
-    cells = [small, _stick(alignment.clip[frame, known], tuple(names), azimuth, "clip")]
-    cells += [_stick(markers, tuple(names), azimuth + turn, f"result {turn}") for turn in _TURNS]
+    return float(np.degrees(np.arctan2(back[0], back[2])))
+
+
+def draw_bones(canvas: Canvas, places: Floats, depths: Floats, names: tuple[str, ...], width: float) -> None:
+    """Draw the bones between ``places`` (N, 2) of markers ``names``, far ones (``depths`` (N,)) first."""
+    for start, end in sorted(bones_between(names), key=lambda bone: -float(depths[list(bone)].mean())):
+        side = LEFT if names[end].startswith("left") else RIGHT if names[end].startswith("right") else MIDDLE
+        canvas.polyline(places[[start, end]], width, side)
+
+
+def _row(
+    picture: Picture,
+    label: str,
+    alignment: Alignment,
+    lifted: Lifted,
+    posed: tuple[tuple[str, ...], Floats],
+    frame: int,
+) -> Picture:
+    small = cv2.resize(
+        picture, (round(picture.shape[1] * _SIDE / picture.shape[0]), _SIDE), interpolation=cv2.INTER_AREA
+    )
+    drawn = Canvas(max(small.shape[1], 90), _SIDE, (255, 255, 255, 255))
+    drawn.paste(small, 0, 0)
+    drawn.text((6, 16), f"drawing {label}", 10, (20, 20, 20))
+    azimuth = azimuth_of(alignment, frame)
+    known = [alignment.names.index(name) for name in lifted.names]
+    cells = [over_paper(drawn.image()), _stick("clip", azimuth, (lifted.names, alignment.clip[frame, known], 4.0))]
+    figures = ((*posed, 5.0), (lifted.names, lifted.markers[frame], 1.5))
+    cells += [_stick("result" if turn == 0 else f"turned {turn}", azimuth + turn, *figures) for turn in _TURNS]
     return np.concatenate(cells, axis=1)
 
 
-def _stick(points: Floats, names: tuple[str, ...], azimuth: float, label: str) -> Picture:
-    canvas = Canvas(_SIDE, _SIDE, (250, 250, 246, 255))
-    known = np.isfinite(points).all(axis=1)
-    middle = (points[known].min(axis=0) + points[known].max(axis=0)) / 2
-    size = 0.8 * _SIDE / max(float(np.ptp(points[known], axis=0).max()), 0.1)
+def _stick(label: str, azimuth: float, *figures: tuple[tuple[str, ...], Floats, float]) -> Picture:
+    """Stick figures (names, places (N, 3), pen) in one cell; the first says how large and where."""
+    canvas = Canvas(_SIDE, _SIDE, _PAPER)
+    points = figures[0][1]
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    size = 0.8 * _SIDE / max(float(np.ptp(points, axis=0).max()), 0.1)
     view = OrthographicCamera.from_angles(azimuth, 0, size, (_SIDE / 2, _SIDE / 2))
-    places = view.project(points - middle)
-    # Far limbs first.
-    bones = sorted(bones_between(names), key=lambda bone: -float(view.depth(points[list(bone)] - middle).mean()))
-    for start, end in bones:
-        side = LEFT if names[end].startswith("left") else RIGHT if names[end].startswith("right") else MIDDLE
-        canvas.polyline(places[[start, end]], 4.0, side)
-    canvas.text((6, 14), label, 9, (110, 110, 110))
+    for names, places, width in figures:
+        draw_bones(canvas, view.project(places - middle), view.depth(places - middle), names, width)
+    canvas.text((6, 16), label, 10, _GREY)
     return over_paper(canvas.image())

@@ -20,8 +20,9 @@ class Alignment:
     the floor at height 0. ``matrices`` (F, 3, 4) are the cameras, of the kind ``mode``. ``markers`` (F, N, 2) are the
     drawn places, guessed where ``estimated`` (F, N): the drawing hides them. ``positions`` (F, N, 3) are the
     drawing's markers in world metres, which project exactly onto ``markers``; ``grounded`` (F, N) tells those whose
-    depth is from the ground. ``errors`` (F,) are RMS distances between clip and seen marks in pixels, ``notes`` what a
-    user should know; ``clip_path`` is the clip's file, and ``swapped`` says that left and right marks are exchanged.
+    depth is from the ground. ``errors`` (F,) are RMS distances between clip and seen marks in pixels, ``notes``
+    what was found or assumed and ``warnings`` what looks wrong, in words; ``clip_path`` is the clip's file, and
+    ``swapped`` says that left and right marks are exchanged.
     """
 
     names: tuple[str, ...]
@@ -40,6 +41,7 @@ class Alignment:
     mirrored: bool = False
     swapped: bool = False
     notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     @cached_property
     def cameras(self) -> tuple[PerspectiveCamera, ...]:

@@ -33,7 +33,7 @@ from pegbar.shot.plan import Shot
 from pegbar.shot.record import fingerprint, is_up_to_date, write_record
 from pegbar.shot.registered import CameraOptions, Retiming
 
-VERSION = 2
+VERSION = 4
 _SHEET = 24
 
 
@@ -148,7 +148,9 @@ class AlignStage:
     def _options(self) -> AlignOptions:
         section = self.shot.settings.align
         wide = None if section.field_of_view is None else math.radians(section.field_of_view)
-        camera = CameraOptions(wide, section.mode, section.root, section.root_smoothing, section.level)
+        camera = CameraOptions(
+            wide, section.mode, section.root, section.root_smoothing, section.level, section.proportions
+        )
         return AlignOptions(camera, section.smoothing, section.ground, section.floor)
 
     def _inputs(self) -> list[Path]:

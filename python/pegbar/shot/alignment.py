@@ -120,7 +120,8 @@ def _lifted(
         errors=track.errors,
         mode=track.mode,
         root=track.root,
-        notes=(*track.notes, *_doubts(drawing, known, track)),
+        notes=track.notes,
+        warnings=tuple(_doubts(drawing, known, track)),
     )
 
 

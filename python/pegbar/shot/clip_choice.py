@@ -82,11 +82,16 @@ def read_clip(section: ClipSection, folder: Path, path: Path) -> Motion:
     )
 
 
-def _named_part(motion: Motion, section: ClipSection) -> Motion:
+def check_part(motion: Motion, section: ClipSection) -> None:
+    """Raise ValueError where ``section`` names frames that the clip does not have."""
     frames = len(motion.positions)
     for key, value, most in (("start", section.start, frames - 1), ("stop", section.stop, frames)):
         if value is not None and value > most:
             raise ValueError(f"clip.{key}: the clip has {frames} frames, from 0 to {frames - 1}; got {value}")
+
+
+def _named_part(motion: Motion, section: ClipSection) -> Motion:
+    check_part(motion, section)
     return motion.slice(section.start, section.stop)
 
 

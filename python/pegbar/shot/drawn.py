@@ -50,7 +50,7 @@ def read_drawn(shot: Shot, frame: int) -> Drawn:
     path = shot.drawings.path(number)
     picture = read_picture(path)
     _check_size(frame, path, picture, shot.settings.shot.size)
-    labels, notes = _labels(shot, frame, picture)
+    labels, notes = read_labels(shot, frame, picture)
     try:
         layer = matte(picture, shot.matte, labels=labels, white_point=settings.white_point)
     except ValueError as error:
@@ -114,7 +114,11 @@ def _slits(ink: NDArray[np.float32]) -> NDArray[np.bool_]:
     return found
 
 
-def _labels(shot: Shot, frame: int, picture: NDArray[np.uint8]) -> tuple[NDArray[np.uint8] | None, tuple[str, ...]]:
+def read_labels(shot: Shot, frame: int, picture: NDArray[np.uint8]) -> tuple[NDArray[np.uint8] | None, tuple[str, ...]]:
+    """Return the limb labels (H, W) of ``frame``, whose drawing is ``picture``, and notes; None where there are none.
+
+    They are painted ones, or a stick figure's; raises as `read_drawn` does.
+    """
     settings = shot.settings.drawing
     if shot.labels is not None:
         return _painted_labels(shot, frame, picture)

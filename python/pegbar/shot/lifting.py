@@ -1,51 +1,27 @@
-"""From an alignment to a 3D animation: markers with rigid limbs, joint angles, and film frames (2009 paper)."""
+"""From an alignment to a 3D animation: markers, joint angles, standing feet, loops (2009 paper, sections 3.4-3.6)."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pegbar.align.pace import film_times
 from pegbar.align.retime import retime
 from pegbar.lift.angles import joint_angles
+from pegbar.lift.fitting import fit_skeleton
+from pegbar.lift.looping import close_loop
 from pegbar.lift.markers import reconstruct_markers
+from pegbar.lift.pins import planted_targets
+from pegbar.lift.reach import CHAINS, hold_ends, stand_still
+from pegbar.lift.retarget import rest_pose
+from pegbar.lift.turned import turn_limbs
 from pegbar.scene.alignment import Alignment
 from pegbar.scene.body import bones_between
-from pegbar.scene.contacts import FEET, foot_contacts
+from pegbar.scene.lifted import Lifted
 from pegbar.scene.motion import Motion
+from pegbar.shot.lift_choices import LiftOptions, fixed_places, flip_rows, limb_lengths, standing_markers
 
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class LiftOptions:
-    """How to lift.
-
-    ``depth`` is "clip" (the drawn marks at the clip's depths) or "lengths" (limbs of constant length, whose
-    foreshortening gives the depth). ``stretch`` keeps the drawing's squash and stretch. For "lengths" alone:
-    ``planted`` holds feet still that the clip plants, ``flips`` are (marker at a limb's outer end, first drawing, one
-    past the last) whose depth is turned by hand.
-    """
-
-    depth: Literal["clip", "lengths"] = "clip"
-    stretch: bool = False
-    planted: bool = True
-    flips: tuple[tuple[str, int, int], ...] = ()
-
-
-@dataclass(frozen=True, eq=False)
-class Lifted:
-    """A drawing in 3D: ``markers`` (F, N, 3) metres of ``names``, and the clip's skeleton posed on them, F drawings."""
-
-    names: tuple[str, ...]
-    bones: tuple[tuple[int, int], ...]
-    markers: Floats
-    planted: NDArray[np.bool_]
-    motion: Motion
+Flags = NDArray[np.bool_]
 
 
 def lift_drawing(alignment: Alignment, clip: Motion, rate: float, options: LiftOptions) -> Lifted:
@@ -65,89 +41,121 @@ def lift_drawing(alignment: Alignment, clip: Motion, rate: float, options: LiftO
     Raises
     ------
     ValueError
-        For fewer than 2 drawings, a clip without a skeleton, or a flip of a marker that hangs on nothing.
+        For fewer than 2 drawings, a clip without a skeleton (unless another is given), a name that is no marker or
+        that hangs on nothing, or fewer than 3 drawings for a loop.
     DegenerateError
         For a drawing with fewer than 4 marks.
     """
+    frames = len(alignment.times)
+    if frames < 2:
+        raise ValueError(f"drawings: want 2 or more with marks to lift a motion, got {frames}")
     known = np.flatnonzero(np.isfinite(alignment.clip).all(axis=(0, 2)))
     names = tuple(alignment.names[index] for index in known)
     bones = bones_between(names)
-    planted = _planted(clip, alignment, names)
+    flips = flip_rows(options.flips, names, bones)
+    planted = standing_markers(clip, alignment, known, names, rate, options.planted)
     if options.depth == "lengths":
-        markers = _by_lengths(alignment, known, names, bones, planted, options)
+        markers = _by_lengths(alignment, known, bones, planted, flips, options)
     else:
-        markers = alignment.positions[:, known]
-    posed = retime(clip, alignment.times, frame_rate=rate)
-    motion = joint_angles(markers, names, posed, stretch=options.stretch)
-    return Lifted(names, bones, markers, planted, motion)
+        markers = turn_limbs(alignment.positions[:, known], alignment.matrices, bones, flips, names)
+        markers = _led(markers, fixed_places(options.held, markers, names))
+    motion, size = _posed(markers, names, bones, retime(clip, alignment.times, frame_rate=rate), options)
+    travel = np.zeros(3)
+    if options.loop:
+        loop = close_loop(motion)
+        motion, travel = loop.motion, loop.travel
+    held = fixed_places(options.held, markers, names)
+    motion = _kept_in_place(motion, names, planted, held, travel if options.loop else None)
+    return Lifted(names, bones, markers, planted, motion, travel, size)
 
 
 def _by_lengths(
     alignment: Alignment,
     known: NDArray[np.intp],
-    names: tuple[str, ...],
     bones: tuple[tuple[int, int], ...],
-    planted: NDArray[np.bool_],
+    planted: Flags,
+    flips: list[tuple[int, int, int]],
     options: LiftOptions,
 ) -> Floats:
     """Markers of limbs of constant length, over the whole sequence at once."""
+    names = tuple(alignment.names[index] for index in known)
     seen = ~alignment.estimated[:, known]
     seen[seen.sum(axis=1) < 4] = True
+    drawn = np.where(seen[..., None], alignment.markers[:, known], np.nan)
+    clip, held = alignment.clip[:, known], fixed_places(options.held, alignment.positions[:, known], names)
     return reconstruct_markers(
-        np.where(seen[..., None], alignment.markers[:, known], np.nan),
-        alignment.clip[:, known],
+        drawn,
+        clip,
         alignment,
         bones,
-        None,
+        limb_lengths(drawn, clip, alignment, names, bones, options.lengths),
         refine=True,
-        planted=planted if options.planted else None,
-        flips=_flips(options.flips, names, bones),
+        planted=planted if planted.any() else None,
+        held=held if np.isfinite(held).any() else None,
+        flips=flips,
         stretch=options.stretch,
         root=names.index("pelvis") if "pelvis" in names else bones[0][0],
     )
 
 
-def on_film(
-    lifted: Motion, holds: Sequence[int], frame_rate: float, *, stepped: bool, rate: float, loop: bool
+def _posed(
+    markers: Floats, names: tuple[str, ...], bones: tuple[tuple[int, int], ...], clip: Motion, options: LiftOptions
+) -> tuple[Motion, float]:
+    """The skeleton on the markers, and how many times larger it is in its own file."""
+    if options.skeleton is None and max(clip.parents) < 0:
+        raise ValueError(
+            "clip: it has points and no skeleton; name a BVH as lift.skeleton whose rest pose is to be posed"
+        )
+    if options.fitted:
+        own = clip if options.skeleton is None else options.skeleton
+        posed = joint_angles(markers, names, clip, skeleton=own)
+        skeleton = fit_skeleton(own, markers, names, posed=posed)
+        return joint_angles(markers, names, clip, stretch=options.stretch, skeleton=skeleton), 1.0
+    if options.skeleton is None:
+        return joint_angles(markers, names, clip, stretch=options.stretch), 1.0
+    size = _size(options.skeleton, markers, names, bones)
+    skeleton = scaled(options.skeleton, 1 / size)
+    return joint_angles(markers, names, clip, stretch=options.stretch, skeleton=skeleton), size
+
+
+def _size(skeleton: Motion, markers: Floats, names: tuple[str, ...], bones: tuple[tuple[int, int], ...]) -> float:
+    """How many times larger than the markers a skeleton is: by its legs, so that feet come onto the same floor."""
+    rest = rest_pose(skeleton)
+    both = [(a, b) for a, b in bones if names[a] in rest.known_markers and names[b] in rest.known_markers]
+    legs = [bone for bone in both if names[bone[1]].endswith(("knee", "foot"))] or both
+    if not legs:
+        return 1.0
+    first, second = np.array(legs).T
+    at_rest = np.stack([rest.markers([names[place] for place in ends]) for ends in (first, second)])
+    own, drawn = at_rest[0] - at_rest[1], markers[:, first] - markers[:, second]
+    lengths = [float(np.median(np.linalg.norm(part, axis=2), axis=0).sum()) for part in (own, drawn)]
+    return lengths[0] / lengths[1] if min(lengths) > 0 else 1.0
+
+
+def scaled(motion: Motion, size: float) -> Motion:
+    """Return ``motion`` and its rest pose ``size`` times as large."""
+    return motion.changed(
+        positions=size * motion.positions,
+        rest=None if motion.rest is None else size * motion.rest,
+        ends={joint: size * np.asarray(end) for joint, end in motion.ends.items()},
+    )
+
+
+def _led(points: Floats, fixed: Floats) -> Floats:
+    """``points`` (F, N, 3) at the places where they are ``fixed``, led there and away."""
+    targets = planted_targets(points, np.zeros(points.shape[:2], bool), fixed)
+    return np.where(np.isfinite(targets), targets, points)
+
+
+def _kept_in_place(
+    motion: Motion, names: tuple[str, ...], planted: Flags, held: Floats, travel: Floats | None
 ) -> Motion:
-    """Return the motion of the drawings at film frames of ``rate`` a second, where the film runs at ``frame_rate``.
-
-    Each drawing is held for ``holds`` film frames: the pose steps, or runs on to the next drawing. ``loop`` adds the
-    first frame again at the end.
-    """
-    places = film_times(np.arange(len(holds), dtype=float), holds, stepped=stepped)
-    count = max(round(len(places) * rate / frame_rate), 1)
-    moments = np.arange(count) * frame_rate / rate
-    if stepped:
-        times = places[np.minimum(moments.astype(int), len(places) - 1)]
-    else:
-        times = np.interp(moments, np.arange(len(places)), places)
-    film = retime(lifted, times, frame_rate=rate)
-    if not loop:
-        return film
-    order = [*range(len(film.positions)), 0]
-    return film.changed(positions=film.positions[order], rotations=film.rotations[order])
-
-
-def _planted(clip: Motion, alignment: Alignment, names: tuple[str, ...]) -> NDArray[np.bool_]:
-    """Which markers (F, N) stand: ankles that the clip plants at the drawings' times."""
-    planted = np.zeros((len(alignment.clip), len(names)), bool)
-    if not {*FEET} <= {*names} & {*clip.known_markers, *clip.names}:
-        return planted
-    contacts = foot_contacts(clip.markers(FEET), FEET, clip.frame_rate)
-    frames = np.clip(np.rint(alignment.times).astype(int), 0, len(contacts) - 1)
-    for side, foot in enumerate(FEET):
-        planted[:, names.index(foot)] = contacts[frames, side]
-    return planted
-
-
-def _flips(
-    flips: Sequence[tuple[str, int, int]], names: tuple[str, ...], bones: Sequence[tuple[int, int]]
-) -> list[tuple[int, int, int]]:
-    outer = {names[child]: index for index, (_, child) in enumerate(bones)}
-    rows = []
-    for name, start, stop in flips:
-        if name not in outer:
-            raise ValueError(f"lift.flips: {name!r} hangs on no other marker; there are {', '.join(outer)}")
-        rows.append((outer[name], start, stop))
-    return rows
+    """The skeleton with standing feet that do not slide, and held hands and feet where they are held."""
+    ends = [name for name in CHAINS if name in names and {name, *CHAINS[name]} <= {*motion.known_markers}]
+    motion = stand_still(motion, {end: planted[:, names.index(end)] for end in ends}, travel=travel)
+    ends = [end for end in ends if np.isfinite(held[:, names.index(end)]).any()]
+    if not ends:
+        return motion
+    fixed = held[:, [names.index(end) for end in ends]]
+    targets = planted_targets(motion.markers(ends), np.zeros(fixed.shape[:2], bool), fixed)
+    return hold_ends(motion, dict(zip(ends, np.moveaxis(targets, 1, 0), strict=True)))

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254, "foot": 0.3048}
 
@@ -27,6 +27,7 @@ def _check_color(text: str) -> str:
 
 
 Color = Annotated[str, AfterValidator(_check_color)]
+Coordinate = Annotated[float, Field(allow_inf_nan=False)]
 
 
 class Section(BaseModel):
@@ -68,6 +69,23 @@ class DrawingSection(Section):
     def refuses_unknown_colors(self) -> bool:
         """Whether a colour that stands for no limb fails its frame: by default where colours are to be exact."""
         return self.unknown_colors == "error" or (self.unknown_colors == "auto" and self.tolerance == 0)
+
+
+class DotsSection(Section):
+    """``[dots]``: a layer of coloured dots that says where the joints are; the annotations are made of it."""
+
+    frames: str
+    joints: dict[Color, str] | str
+    limbs: dict[str, Color] = {}
+    tolerance: float = Field(60.0, ge=0, le=442, allow_inf_nan=False)
+    carry: Literal["flow", "straight", "none"] = "flow"
+    average: int = Field(1, ge=1)
+
+    @model_validator(mode="after")
+    def _averages_about_a_middle(self) -> DotsSection:
+        if self.average % 2 == 0:
+            raise ValueError(f"average: want an odd number of drawings, got {self.average}")
+        return self
 
 
 class CameraSection(Section):
@@ -131,6 +149,7 @@ class AlignSection(Section):
     smoothing: float = Field(default=0.0, ge=0, allow_inf_nan=False)
     root_smoothing: float = Field(default=0.25, ge=0, allow_inf_nan=False)
     level: float = Field(default=0.0, ge=0, allow_inf_nan=False)
+    proportions: Literal["auto", "drawn", "clip"] = "auto"
     ground: bool = False
     floor: float | None = Field(default=None, allow_inf_nan=False)
     use: Literal["auto", "always", "never"] = "auto"
@@ -143,18 +162,84 @@ class FlipEntry(Section):
     drawings: str
 
 
+class HeldEntry(Section):
+    """A joint that stays at one place for a range of drawings: where it is in their mean, or ``at`` world metres."""
+
+    joint: str
+    drawings: str
+    at: tuple[Coordinate, Coordinate, Coordinate] | None = None
+
+
 class LiftSection(Section):
     """``[lift]``: how the drawing becomes a 3D animation, and what is written."""
 
     output: str = "lift"
     depth: Literal["clip", "lengths"] = "clip"
     stretch: bool = False
-    planted: bool = True
-    frame_rate: float | None = Field(default=None, gt=0, allow_inf_nan=False)
+    lengths: Literal["found", "clip"] | dict[str, Annotated[float, Field(gt=0, allow_inf_nan=False)]] = "found"
+    planted: bool | dict[Literal["left_foot", "right_foot"], str] = True
+    held: list[HeldEntry] = []
+    flips: list[FlipEntry] = []
+    skeleton: str | None = None
+    skeleton_joints: str | None = None
+    skeleton_size: Literal["own", "drawing"] = "own"
+    proportions: Literal["drawing", "skeleton"] | None = None
+    frame_rate: Literal["drawings"] | Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
     interpolation: Literal["step", "linear"] = "step"
     loop: bool = False
     formats: list[Literal["bvh", "glb", "usd", "csv", "npz"]] = ["bvh", "glb", "csv", "npz"]
-    flips: list[FlipEntry] = []
+    preview: Literal["gif", "png", "webp", "none"] = "gif"
+
+    @model_validator(mode="after")
+    def _lengths_need_their_depth(self) -> LiftSection:
+        if self.lengths != "found" and self.depth != "lengths":
+            raise ValueError('lengths: only depth = "lengths" takes lengths of limbs')
+        return self
+
+
+class WindSection(Section):
+    """``[secondary.wind]``: steady air and gusts."""
+
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    gusts: float = Field(default=0.5, ge=0, allow_inf_nan=False)
+    size: float = Field(default=1.5, gt=0, allow_inf_nan=False)
+
+
+class ElementEntry(BaseModel):
+    """One entry of ``elements``: a preset and what is to be different from it; the preset checks its own keys."""
+
+    model_config = ConfigDict(extra="allow", frozen=True, str_min_length=1)
+
+    preset: str
+    name: str | None = None
+    character: str | None = None
+
+    @property
+    def fields(self) -> dict[str, Any]:
+        """The preset's own keys."""
+        return dict(self.model_extra or {})
+
+
+def _as_entry(value: Any) -> Any:
+    return {"preset": value} if isinstance(value, str) else value
+
+
+class SecondarySection(Section):
+    """``[secondary]``: what is simulated around the drawn character, and how it is rendered."""
+
+    output: str = "secondary"
+    elements: list[Annotated[ElementEntry, BeforeValidator(_as_entry)]] = Field(default=[], min_length=1)
+    ground: Literal["auto", "none"] | Annotated[float, Field(allow_inf_nan=False)] = "auto"
+    gravity: float = Field(default=9.81, ge=0, allow_inf_nan=False)
+    wind: WindSection = WindSection()
+    pre_roll: int = Field(default=24, ge=0, le=10_000)
+    seed: int = Field(default=0, ge=0)
+    samples: int = Field(default=2, ge=1, le=8)
+    shadow: bool = True
+    separate: bool = False
+    misfit: float = Field(default=0.25, gt=0, allow_inf_nan=False)
+    characters: list[str] = []
+    frames: str = "secondary/final/final.####.png"
 
 
 class OutputSection(Section):
@@ -190,9 +275,11 @@ class ShotFile(Section):
 
     shot: ShotSection = Field(default_factory=ShotSection)
     drawing: DrawingSection
+    dots: DotsSection | None = None
     clip: ClipSection | None = None
     align: AlignSection = AlignSection()
     lift: LiftSection = LiftSection()
+    secondary: SecondarySection | None = None
     camera: CameraSection | None = None
     passes: PassesSection | None = None
     output: OutputSection = Field(default_factory=OutputSection)

@@ -161,7 +161,7 @@ class CompositeStage(Stage):
             space=target,
             dtype=np.float32 if self.shot.settings.output.is_exr else np.uint8,
         )
-        _write_final(final, picture)
+        write_final(final, picture)
         if holdout:
             kept = holdout_matte(drawn.alpha, drawn.depth, depth)
             write_image(holdout[0], np.rint(kept * 255).astype(np.uint8)[..., None])
@@ -202,7 +202,8 @@ def check_passes(frame: int, path: Path, drawn: Drawn, beauty: NDArray[Any], dep
         )
 
 
-def _write_final(path: Path, picture: NDArray[Any]) -> None:
+def write_final(path: Path, picture: NDArray[Any]) -> None:
+    """Write a finished ``picture`` as the suffix of ``path`` says; JPEG is put over white."""
     if path.suffix.lower() in (".jpg", ".jpeg"):
         write_image(path, over_paper(picture))
     elif path.suffix.lower() == ".exr":

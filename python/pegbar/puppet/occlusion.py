@@ -1,0 +1,164 @@
+"""What is in front of what, frame by frame (2007 paper, s7: "triangle depths ... directly from the 3D pose").
+
+Triangles are ordered by limb, not one by one: a limb is in front of another where they cross in the picture, and stays
+there until it is clearly behind. So nothing flickers where two limbs have about the same depth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pegbar.puppet.bone_weights import bone_distances
+from pegbar.scene.camera import PerspectiveCamera
+from pegbar.scene.puppet import Puppet
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Ints = NDArray[np.int64]
+#: Share of the figure's size in the depth by which an order must be wrong before it changes.
+HYSTERESIS = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """What keeps together in depth: the triangles of one bone on one layer.
+
+    ``of_triangle`` (T,) int is each triangle's piece; ``bones`` (P,) int and ``layers`` (P,) int are a piece's bone (-1
+    none) and layer, ``radii`` (P,) how far its vertices are from the bone in pixels.
+    """
+
+    of_triangle: Ints
+    bones: Ints
+    layers: Ints
+    radii: Floats
+
+    @classmethod
+    def of_puppet(cls, puppet: Puppet) -> Pieces:
+        """Find the pieces of a puppet."""
+        keys = np.stack([puppet.triangle_layer, puppet.triangle_bone], axis=1)
+        kinds, of_triangle = np.unique(keys, axis=0, return_inverse=True)
+        of_triangle = of_triangle.reshape(-1)
+        distances, _ = bone_distances(puppet.vertices, puppet.marks, puppet.bones)
+        radii = np.zeros(len(kinds))
+        for piece, (_, bone) in enumerate(kinds.tolist()):
+            corners = np.unique(puppet.triangles[of_triangle == piece])
+            radii[piece] = np.percentile(distances[corners, bone], 90) if bone >= 0 else 0.0
+        return cls(of_triangle, kinds[:, 1], kinds[:, 0], radii)
+
+
+def piece_ranks(pieces: Pieces, bones: Ints, camera: PerspectiveCamera, poses: Floats) -> Ints:
+    """Return the place (F, P) of every piece in each frame, 0 the farthest.
+
+    Parameters
+    ----------
+    pieces : Pieces
+    bones : (B, 2) int
+    camera : PerspectiveCamera
+    poses : (F, J, 3) float
+        World metres.
+    """
+    pixels, depths = camera.project(poses), camera.depth(poses)
+    size = float(np.median(np.ptp(poses[:, :, 1], axis=1))) if len(poses) else 0.0
+    count = len(pieces.bones)
+    # A piece without a bone keeps its place among the layers.
+    first, second = np.triu_indices(count, 1)
+    known = (pieces.bones[first] >= 0) & (pieces.bones[second] >= 0)
+    known &= pieces.bones[first] != pieces.bones[second]
+    behind, cover = _crossings(pieces, bones, pixels, depths, first[known], second[known])
+    drawn = _drawn_in_front(pieces, bones)[first, second]
+    front = np.broadcast_to(drawn, (len(poses), len(first))).copy()
+    touching = np.ones(front.shape, bool)
+    front[:, known] = settle(behind, cover, HYSTERESIS * size, drawn[known])
+    touching[:, known] = cover
+    relation = np.zeros((len(poses), count, count), np.int8)
+    strength = np.where(front, 1, -1) * (1 + touching)
+    relation[:, first, second], relation[:, second, first] = strength, -strength
+    return np.stack([_ranks(frame) for frame in relation]) if len(poses) else np.zeros((0, count), np.int64)
+
+
+def settle(behind: Floats, cover: Flags, margin: float, drawn: Flags) -> Flags:
+    """Return who is in front (F, K) over time, with hysteresis.
+
+    ``behind`` (F, K) is by how much the second of a pair is farther than the first, ``cover`` (F, K) whether the two
+    cover each other, ``margin`` by how much an order must be wrong to change while they do, ``drawn`` (K,) the order
+    where the first frame does not tell.
+    """
+    front = np.empty(behind.shape, bool)
+    if not len(behind):
+        return front
+    now = np.where(np.abs(behind[0]) > margin, behind[0] > 0, drawn)
+    for frame in range(len(behind)):
+        free = ~cover[frame] & (np.abs(behind[frame]) > margin / 4)
+        changes = free | (np.abs(behind[frame]) > margin)
+        now = np.where(changes, behind[frame] > 0, now)
+        front[frame] = now
+    return front
+
+
+def _crossings(
+    pieces: Pieces, bones: Ints, pixels: Floats, depths: Floats, first: Ints, second: Ints
+) -> tuple[Floats, Flags]:
+    """How much farther the second of each pair is than the first where they come nearest, and whether they cover."""
+    ends = [bones[pieces.bones[chosen]] for chosen in (first, second)]
+    a0, a1, b0, b1 = (pixels[:, pair[:, end]] for pair in ends for end in (0, 1))
+    near_a, near_b, distance = nearest_points(a0, a1 - a0, b0, b1 - b0)
+    depth = [
+        depths[:, pair[:, 0]] * (1 - share) + depths[:, pair[:, 1]] * share
+        for pair, share in zip(ends, (near_a, near_b), strict=True)
+    ]
+    behind = depth[1] - depth[0]
+    # Bones that meet at a joint are nearest there, at no distance: the rest of the bones tells.
+    meeting = (ends[0][:, :, None] == ends[1][:, None, :]).any(axis=(1, 2))
+    middles = [depths[:, pair].mean(axis=2) for pair in ends]
+    behind = np.where(meeting, middles[1] - middles[0], behind)
+    return behind, distance < pieces.radii[first] + pieces.radii[second]
+
+
+def nearest_points(start: Floats, along: Floats, other: Floats, across: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return where two segments (..., 2), given by starts and extents, come nearest: shares (...) and distance (...).
+
+    Where they cross the distance is 0.
+    """
+    aa, bb = (along**2).sum(-1) + 1e-12, (across**2).sum(-1) + 1e-12
+    ab = (along * across).sum(-1)
+    gap = start - other
+    ag, bg = (along * gap).sum(-1), (across * gap).sum(-1)
+    determinant = aa * bb - ab * ab
+    share = np.where(determinant > 1e-9 * aa * bb, (ab * bg - ag * bb) / np.maximum(determinant, 1e-300), 0.5)
+    share = np.clip(share, 0, 1)
+    partner = np.clip((ab * share + bg) / bb, 0, 1)
+    share = np.clip((ab * partner - ag) / aa, 0, 1)
+    apart = gap + share[..., None] * along - partner[..., None] * across
+    return share, partner, np.linalg.norm(apart, axis=-1)
+
+
+def _drawn_in_front(pieces: Pieces, bones: Ints) -> Flags:
+    """Whether piece i is drawn in front of piece j (P, P): the nearer layer, on one layer what is farther out."""
+    steps = np.zeros(len(bones) + 1)
+    at_joint: dict[int, float] = {}
+    for bone, (parent, child) in enumerate(bones.tolist()):
+        steps[bone] = at_joint.get(parent, 0.0) + 1
+        at_joint[child] = steps[bone]
+    score = -pieces.layers * (len(bones) + 2.0) + steps[pieces.bones]
+    return score[:, None] > score[None, :]
+
+
+def _ranks(relation: NDArray[np.int8]) -> Ints:
+    """Places (P,), 0 the farthest, from who is in front: ``relation[i, j]`` > 0 where i is in front of j, 2 surely.
+
+    The farthest of what is left is what is in front of nothing that is surely before it; where there is a circle, what
+    is in front of the fewest.
+    """
+    count = len(relation)
+    ranks, left = np.empty(count, np.int64), np.ones(count, bool)
+    sure, weak = relation > 1, relation > 0
+    over, loosely = sure.sum(axis=1), weak.sum(axis=1)
+    for place in range(count):
+        candidates = np.flatnonzero(left)
+        lowest = candidates[np.lexsort((candidates, loosely[candidates], over[candidates]))[0]]
+        ranks[lowest], left[lowest] = place, False
+        over, loosely = over - sure[:, lowest], loosely - weak[:, lowest]
+    return ranks

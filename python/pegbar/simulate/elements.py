@@ -1,0 +1,173 @@
+"""Elements of a simulation: cloth with its pins, balls, boxes and props held in a hand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pegbar import arrays
+from pegbar.simulate.materials import ClothMaterial, Look, RigidMaterial
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+PIN_KINDS = ("marker", "limb", "world")
+
+
+@dataclass(frozen=True, eq=False)
+class Pin:
+    """Holds vertices where something is.
+
+    ``kind`` "marker" keeps them at their distance from the marker ``target``, "limb" at their place on the limb
+    ``target`` (which turns, grows and thickens), "world" where they are. ``vertices`` (p,) are the indices held, None
+    all of them; ``character`` names whose marker or limb it is (None: the scene's first).
+    """
+
+    kind: str
+    target: str = ""
+    vertices: Integers | None = None
+    character: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.kind not in PIN_KINDS:
+            raise ValueError(f"kind: want one of {', '.join(PIN_KINDS)}, got {self.kind!r}")
+        if self.kind != "world" and not self.target:
+            raise ValueError(f"target: a pin to a {self.kind} wants its name")
+        if self.vertices is not None:
+            object.__setattr__(self, "vertices", arrays.integers("vertices", self.vertices, ("p",), low=0))
+
+
+@dataclass(frozen=True, eq=False)
+class Cloth:
+    """A sheet of triangles.
+
+    Parameters
+    ----------
+    name : str
+        Unique in the scene.
+    vertices : (n, 3) float
+        Where the cloth is before the first frame, world metres.
+    triangles : (T, 3) int
+        Indices into ``vertices``.
+    pins : tuple of Pin
+        What holds it.
+    seams : (s, 2) int
+        Pairs of vertices sewn together.
+    rest : (n, 3) float, optional
+        The shape whose lengths and angles the cloth keeps, None: ``vertices``.
+    coordinates : (n, 2) float, optional
+        Texture coordinates in metres of cloth (across, along) for patterns; None: none.
+    material, look
+        What it is made of and looks like.
+    """
+
+    name: str
+    vertices: Floats
+    triangles: Integers
+    pins: tuple[Pin, ...] = ()
+    seams: Integers = field(default_factory=lambda: np.empty((0, 2), np.int64))
+    rest: Floats | None = None
+    coordinates: Floats | None = None
+    material: ClothMaterial = field(default_factory=ClothMaterial)
+    look: Look = field(default_factory=Look)
+
+    def __post_init__(self) -> None:
+        vertices = arrays.floats("vertices", self.vertices, ("n", 3))
+        last = len(vertices) - 1
+        _set(self, "vertices", vertices)
+        _set(self, "triangles", arrays.integers("triangles", self.triangles, ("T", 3), low=0, high=last))
+        _set(self, "seams", arrays.integers("seams", self.seams, ("s", 2), low=0, high=last))
+        rest = vertices if self.rest is None else arrays.floats("rest", self.rest, vertices.shape)
+        _set(self, "rest", rest)
+        if self.coordinates is not None:
+            _set(self, "coordinates", arrays.floats("coordinates", self.coordinates, (len(vertices), 2)))
+        for pin in self.pins:
+            if pin.vertices is not None and pin.vertices.size and pin.vertices.max() > last:
+                raise ValueError(f"pins: {self.name}: vertex {pin.vertices.max()} is not one of {last + 1}")
+
+
+@dataclass(frozen=True, eq=False)
+class Balls:
+    """Rigid balls: ``centers`` (n, 3) and ``velocities`` (n, 3) before the first frame, ``radii`` (n,), metres.
+
+    ``colors`` (n, 4) straight linear RGBA are their own colours (None: all have the look's).
+    """
+
+    name: str
+    centers: Floats
+    radii: Floats
+    velocities: Floats | None = None
+    colors: NDArray[np.float32] | None = None
+    material: RigidMaterial = field(default_factory=RigidMaterial)
+    look: Look = field(default_factory=Look)
+
+    def __post_init__(self) -> None:
+        centers = arrays.floats("centers", self.centers, ("n", 3))
+        _set(self, "centers", centers)
+        _set(self, "radii", _positive("radii", self.radii, (len(centers),)))
+        velocities = np.zeros_like(centers) if self.velocities is None else self.velocities
+        _set(self, "velocities", arrays.floats("velocities", velocities, centers.shape))
+        if self.colors is not None:
+            _set(self, "colors", arrays.floats("colors", self.colors, (len(centers), 4), dtype=np.float32))
+
+
+@dataclass(frozen=True, eq=False)
+class Boxes:
+    """Rigid boxes: ``centers`` (n, 3), ``sizes`` (n, 3) their edges, ``velocities`` (n, 3), world metres.
+
+    ``colors`` (n, 4) straight linear RGBA are their own colours (None: all have the look's).
+    """
+
+    name: str
+    centers: Floats
+    sizes: Floats
+    velocities: Floats | None = None
+    colors: NDArray[np.float32] | None = None
+    material: RigidMaterial = field(default_factory=RigidMaterial)
+    look: Look = field(default_factory=Look)
+
+    def __post_init__(self) -> None:
+        centers = arrays.floats("centers", self.centers, ("n", 3))
+        _set(self, "centers", centers)
+        _set(self, "sizes", _positive("sizes", self.sizes, centers.shape))
+        velocities = np.zeros_like(centers) if self.velocities is None else self.velocities
+        _set(self, "velocities", arrays.floats("velocities", velocities, centers.shape))
+        if self.colors is not None:
+            _set(self, "colors", arrays.floats("colors", self.colors, (len(centers), 4), dtype=np.float32))
+
+
+@dataclass(frozen=True, eq=False)
+class Prop:
+    """A thing held in a hand: it follows its pin and pushes what it meets, and nothing moves it.
+
+    ``vertices`` (n, 3) is its mesh before the first frame, world metres; ``capsules`` (c, 8) are the volumes that
+    push: start (3) and its radius, end (3) and its radius.
+    """
+
+    name: str
+    vertices: Floats
+    triangles: Integers
+    pin: Pin
+    capsules: Floats = field(default_factory=lambda: np.empty((0, 8)))
+    look: Look = field(default_factory=Look)
+
+    def __post_init__(self) -> None:
+        vertices = arrays.floats("vertices", self.vertices, ("n", 3))
+        _set(self, "vertices", vertices)
+        _set(self, "triangles", arrays.integers("triangles", self.triangles, ("T", 3), low=0, high=len(vertices) - 1))
+        _set(self, "capsules", arrays.floats("capsules", self.capsules, ("c", 8)))
+
+
+Element = Cloth | Balls | Boxes | Prop
+
+
+def _set(value: object, name: str, field_value: object) -> None:
+    object.__setattr__(value, name, field_value)
+
+
+def _positive(name: str, value: ArrayLike, shape: arrays.Shape) -> Floats:
+    values: Floats = arrays.floats(name, value, shape)
+    if values.size and values.min() <= 0:
+        raise ValueError(f"{name}: want numbers above zero, got {values.min()}")
+    return values

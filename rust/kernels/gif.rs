@@ -1,0 +1,283 @@
+//! The frames of a GIF: colours to a palette's indices, and the indices packed by LZW (GIF89a, appendix F).
+//!
+//! Where frames are opaque only the rectangle that changed is kept, and what stays the same in it is transparent: long
+//! runs pack well. With transparent frames the rectangle is that of the picture, laid on an empty ground.
+
+use crate::error::{KernelError, check_length};
+use rayon::prelude::*;
+
+/// Values of the table from colours to indices: five bits of each of red, green and blue, red highest.
+pub const TABLE: usize = 1 << 15;
+/// The index that stays transparent.
+pub const CLEAR: u8 = 255;
+/// Least alpha of a pixel that is shown.
+const OPAQUE: u8 = 128;
+/// Codes have at most twelve bits.
+const CODES: u16 = 4096;
+/// Colours are bytes, so an index has eight bits and the first two free codes are these.
+const RESET: u16 = 256;
+const END: u16 = 257;
+
+/// One frame, packed: where it lies and its data in GIF's sub-blocks, without the leading code size (always 8).
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Packed {
+    /// Left, top, width and height in pixels.
+    pub place: [usize; 4],
+    /// Sub-blocks with their closing zero.
+    pub data: Vec<u8>,
+}
+
+/// Packs frames of `width` x `height` straight RGBA pixels that follow each other.
+///
+/// `previous` holds the indices of the frame before the first: what does not change is left out, in place of what is
+/// transparent, and the last frame's indices are put there. Without it frames are transparent where their alpha is low.
+pub fn pack_frames(
+    frames: &[[u8; 4]],
+    width: usize,
+    height: usize,
+    table: &[u8],
+    previous: Option<&mut [u8]>,
+) -> Result<Vec<Packed>, KernelError> {
+    let size = width * height;
+    check_length("table", TABLE, table.len())?;
+    if size == 0 || width > 65535 || height > 65535 || !frames.len().is_multiple_of(size) {
+        return Err(KernelError::Argument {
+            argument: "frames",
+            problem: "want whole frames of 1 to 65535 pixels a side",
+        });
+    }
+    let indexed: Vec<Vec<u8>> = frames.par_chunks_exact(size).map(|frame| indices(frame, table)).collect();
+    let Some(last) = previous else {
+        return Ok(indexed.par_iter().map(|frame| pack(frame, None, width, height)).collect());
+    };
+    check_length("previous", size, last.len())?;
+    let packed = (0..indexed.len()).into_par_iter().map(|at| {
+        let before = if at == 0 { &*last } else { &indexed[at - 1] };
+        pack(&indexed[at], Some(before), width, height)
+    });
+    let packed = packed.collect();
+    if let Some(frame) = indexed.last() {
+        last.copy_from_slice(frame);
+    }
+    Ok(packed)
+}
+
+/// The palette's index of every pixel.
+fn indices(frame: &[[u8; 4]], table: &[u8]) -> Vec<u8> {
+    let index = |&[red, green, blue, alpha]: &[u8; 4]| {
+        let entry = (usize::from(red >> 3) << 10) | (usize::from(green >> 3) << 5) | usize::from(blue >> 3);
+        if alpha < OPAQUE { CLEAR } else { table[entry] }
+    };
+    frame.iter().map(index).collect()
+}
+
+/// The smallest rectangle that holds what is shown, packed; one pixel where nothing is.
+fn pack(frame: &[u8], before: Option<&[u8]>, width: usize, height: usize) -> Packed {
+    let shown = |at: usize| before.map_or(frame[at] != CLEAR, |before| frame[at] != before[at]);
+    let row_shows = |row: &usize| (row * width..(row + 1) * width).any(shown);
+    let Some(top) = (0..height).find(row_shows) else {
+        let data = compress(std::iter::once(CLEAR));
+        return Packed { place: [0, 0, 1, 1], data };
+    };
+    let bottom = (top..height).rev().find(row_shows).map_or(top, |row| row + 1);
+    let (mut left, mut right) = (width, 0);
+    for row in top..bottom {
+        let start = row * width;
+        left = (0..left).find(|column| shown(start + column)).unwrap_or(left);
+        right = (right..width).rev().find(|column| shown(start + column)).map_or(right, |column| column + 1);
+    }
+    let pixels = (top..bottom).flat_map(|row| row * width + left..row * width + right);
+    let data = compress(pixels.map(|at| if shown(at) { frame[at] } else { CLEAR }));
+    Packed { place: [left, top, right - left, bottom - top], data }
+}
+
+/// Codes of growing width, least significant bit first, in sub-blocks of at most 255 bytes.
+struct Writer {
+    bytes: Vec<u8>,
+    /// Where the length of the sub-block that is being filled stands.
+    block: usize,
+    bits: u32,
+    filled: u32,
+}
+
+impl Writer {
+    fn put(&mut self, code: u16, width: u32) {
+        self.bits |= u32::from(code) << self.filled;
+        self.filled += width;
+        while self.filled >= 8 {
+            self.byte();
+        }
+    }
+
+    fn byte(&mut self) {
+        if self.bytes[self.block] == 255 {
+            self.block = self.bytes.len();
+            self.bytes.push(0);
+        }
+        self.bytes.push(self.bits as u8);
+        self.bytes[self.block] += 1;
+        self.bits >>= 8;
+        self.filled = self.filled.saturating_sub(8);
+    }
+
+    fn finish(mut self) -> Vec<u8> {
+        if self.filled > 0 {
+            self.byte();
+        }
+        self.bytes.push(0);
+        self.bytes
+    }
+}
+
+/// A table of strings that were seen: the code of a known string with one more index.
+struct Strings {
+    /// The string's code and the index, above them the code of both; open addressing.
+    entries: Vec<u32>,
+}
+
+const SLOTS: usize = 1 << 14;
+const FREE: u32 = u32::MAX;
+
+impl Strings {
+    /// The code of `prefix` followed by `index`, or the slot where it belongs.
+    fn find(&self, prefix: u16, index: u8) -> Result<u16, usize> {
+        let key = (u32::from(prefix) << 8) | u32::from(index);
+        let mut slot = (key.wrapping_mul(0x9E37_79B1) >> 18) as usize;
+        loop {
+            match self.entries[slot] {
+                FREE => return Err(slot),
+                entry if entry & 0xF_FFFF == key => return Ok((entry >> 20) as u16),
+                _ => slot = (slot + 1) % SLOTS,
+            }
+        }
+    }
+}
+
+/// Indices as sub-blocks of LZW codes.
+fn compress(mut indices: impl Iterator<Item = u8>) -> Vec<u8> {
+    let mut writer = Writer { bytes: vec![0], block: 0, bits: 0, filled: 0 };
+    let mut strings = Strings { entries: vec![FREE; SLOTS] };
+    let (mut next, mut width) = (END + 1, 9);
+    writer.put(RESET, width);
+    let Some(first) = indices.next() else {
+        writer.put(END, width);
+        return writer.finish();
+    };
+    let mut prefix = u16::from(first);
+    for index in indices {
+        let slot = match strings.find(prefix, index) {
+            Ok(code) => {
+                prefix = code;
+                continue;
+            }
+            Err(slot) => slot,
+        };
+        writer.put(prefix, width);
+        if next < CODES {
+            strings.entries[slot] = (u32::from(next) << 20) | (u32::from(prefix) << 8) | u32::from(index);
+            // The decoder is one code behind, so a width serves one code longer than it holds.
+            if next == 1 << width {
+                width += 1;
+            }
+            next += 1;
+        } else {
+            writer.put(RESET, width);
+            strings.entries.fill(FREE);
+            (next, width) = (END + 1, 9);
+        }
+        prefix = u16::from(index);
+    }
+    writer.put(prefix, width);
+    // The decoder has added an entry since: its width may have grown.
+    if next == 1 << width && width < 12 {
+        width += 1;
+    }
+    writer.put(END, width);
+    writer.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The indices of packed data, by the decoder that the format describes.
+    fn expand(data: &[u8]) -> Vec<u8> {
+        let (mut bytes, mut at) = (Vec::new(), 0);
+        while data[at] > 0 {
+            bytes.extend(&data[at + 1..=at + data[at] as usize]);
+            at += data[at] as usize + 1;
+        }
+        let (mut strings, mut width, mut bit, mut out): (Vec<Vec<u8>>, _, _, Vec<u8>) = (Vec::new(), 9, 0, Vec::new());
+        let mut last: Option<Vec<u8>> = None;
+        loop {
+            let code = (0..width).fold(0usize, |code, place| {
+                let from: usize = bit + place;
+                code | (usize::from(bytes[from / 8] >> (from % 8) & 1) << place)
+            });
+            bit += width;
+            if code == 256 {
+                strings = (0..258).map(|value| vec![value as u8]).collect();
+                (width, last) = (9, None);
+                continue;
+            }
+            if code == 257 {
+                return out;
+            }
+            let string = match (strings.get(code), &last) {
+                (Some(known), _) => known.clone(),
+                (None, Some(before)) => [before.as_slice(), &before[..1]].concat(),
+                (None, None) => unreachable!(),
+            };
+            if let Some(before) = last {
+                strings.push([before.as_slice(), &string[..1]].concat());
+                if strings.len() == 1 << width && width < 12 {
+                    width += 1;
+                }
+            }
+            out.extend(&string);
+            last = Some(string);
+        }
+    }
+
+    fn noise(count: usize, kinds: u32) -> Vec<u8> {
+        let mut state = 1u32;
+        let step = |_| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            ((state >> 16) % kinds) as u8
+        };
+        (0..count).map(step).collect()
+    }
+
+    #[test]
+    fn what_is_packed_comes_back() {
+        for kinds in [1, 2, 3, 200, 255] {
+            for count in [1, 2, 3, 255, 256, 3838, 3839, 3840, 5000, 60_000] {
+                let indices = noise(count, kinds);
+                assert_eq!(expand(&compress(indices.iter().copied())), indices, "{kinds} kinds, {count}");
+            }
+        }
+    }
+
+    #[test]
+    fn only_what_changed_is_kept() {
+        let table: Vec<u8> = (0..TABLE).map(|entry| (entry >> 10) as u8).collect();
+        let mut frames = vec![[0, 0, 0, 255]; 2 * 12];
+        frames[12 + 5] = [255, 0, 0, 255];
+        frames[12 + 7] = [255, 0, 0, 255];
+        let mut previous = vec![0; 12];
+        let packed = pack_frames(&frames, 4, 3, &table, Some(&mut previous)).unwrap();
+        assert_eq!(packed[0].place, [0, 0, 1, 1]);
+        assert_eq!(packed[1].place, [1, 1, 3, 1]);
+        assert_eq!(expand(&packed[1].data), [31, CLEAR, 31]);
+        assert_eq!(previous, [0, 0, 0, 0, 0, 31, 0, 31, 0, 0, 0, 0]);
+    }
+
+    #[test]
+    fn low_alpha_is_left_out() {
+        let table = vec![7; TABLE];
+        let mut frame = vec![[9, 9, 9, 127]; 6];
+        frame[4][3] = 128;
+        let packed = pack_frames(&frame, 3, 2, &table, None).unwrap();
+        assert_eq!((packed[0].place, expand(&packed[0].data)), ([1, 1, 1, 1], vec![7]));
+    }
+}

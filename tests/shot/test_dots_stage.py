@@ -1,0 +1,99 @@
+"""`pegbar dots`: a layer of dots over the sample's drawings becomes its annotations."""
+
+import json
+
+import numpy as np
+import pytest
+
+from pegbar import read_annotations
+from pegbar.cli.main import main
+from pegbar.io.frames import write_image
+from pegbar.report.canvas import Canvas
+from pegbar.scene.body import MARKERS
+
+COLORS = [(r, g, b) for r in (0, 120, 255) for g in (0, 120, 255) for b in (0, 120, 255) if len({r, g, b}) > 1]
+SHOT = """\
+[drawing]
+frames = "d.##.png"
+annotations = "marks.json"
+
+[dots]
+frames = "dots/k.##.png"
+{joints}
+"""
+
+
+def make(folder, keys=(1, 4, 7), hidden=(), joints=None):
+    """A figure whose sixteen joints move to the right by 4 pixels a drawing, seven drawings."""
+    (folder / "dots").mkdir(parents=True)
+    places = np.stack([20 + 12.0 * (np.arange(16) % 4), 20 + 14.0 * (np.arange(16) // 4)], axis=1)
+    colors = COLORS[:16]
+    for number in range(1, 8):
+        drawing, dots = Canvas(120, 90, (255, 255, 255, 255)), Canvas(120, 90)
+        for index, place in enumerate(places + np.array([4.0 * (number - 1), 0])):
+            drawing.circle(place, 4, (40 + 10 * index,) * 3)
+            if (number, MARKERS[index]) not in hidden:
+                dots.circle(place, 2.5, colors[index])
+        write_image(folder / f"d.{number:02d}.png", drawing.image()[..., :3].copy())
+        if number in keys:
+            write_image(folder / f"dots/k.{number:02d}.png", dots.image())
+    table = {"#" + bytes(color).hex(): name for color, name in zip(colors, MARKERS, strict=True)}
+    written = ", ".join(f'"{color}" = "{name}"' for color, name in table.items())
+    (folder / "shot.toml").write_text(SHOT.format(joints=joints or f"joints = {{ {written} }}"))
+    return places, table
+
+
+def test_dots_become_marks_and_are_carried_between_keys(tmp_path, capsys):
+    places, _ = make(tmp_path, hidden={(4, "left_hand")})
+    assert main(["dots", str(tmp_path / "shot.toml")]) == 0
+    assert "left_hand has no dot in drawings 4: hidden there" in capsys.readouterr().err
+    drawing = read_annotations(tmp_path / "marks.json")
+    assert drawing.names == MARKERS
+    hand = MARKERS.index("left_hand")
+    assert np.argwhere(~drawing.visible).tolist() == [[row, hand] for row in (2, 3, 4)]
+    wanted = places + 4 * np.arange(7)[:, None, None] * [1, 0]
+    np.testing.assert_allclose(drawing.markers[[0, 3, 6]], wanted[[0, 3, 6]], atol=0.5)
+    np.testing.assert_allclose(drawing.markers, wanted, atol=1.5)
+    assert drawing.notes["carried"] == "drawings 2-3, 5-6"
+    assert len(drawing.limbs) == 10
+
+
+def test_up_to_date_until_a_dot_moves(tmp_path, capsys):
+    make(tmp_path)
+    shot = str(tmp_path / "shot.toml")
+    assert main(["dots", shot]) == 0
+    assert main(["dots", shot]) == 0
+    assert "up to date" in capsys.readouterr().out
+    write_image(tmp_path / "dots/k.04.png", np.zeros((90, 120, 4), np.uint8))
+    assert main(["dots", shot]) == 0
+    assert "written" in capsys.readouterr().out
+
+
+def test_a_palette_may_be_a_file_and_wrong_ones_are_named(tmp_path, capsys):
+    _, table = make(tmp_path, joints='joints = "palette.json"')
+    (tmp_path / "palette.json").write_text(json.dumps(table))
+    assert main(["dots", str(tmp_path / "shot.toml")]) == 0
+    (tmp_path / "palette.json").write_text('{"#ff0000": 3}')
+    assert main(["dots", str(tmp_path / "shot.toml")]) == 2
+    assert "palette.json: want a table" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('joints = { "#ff0000" = "head", "#00ff00" = "head" }', "head has more than one colour"),
+        ("joints = 3", "joints"),
+    ],
+)
+def test_what_cannot_be_is_refused(tmp_path, capsys, text, message):
+    make(tmp_path, joints=text)
+    assert main(["dots", str(tmp_path / "shot.toml")]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_shot_without_dots_says_so(tmp_path, capsys):
+    make(tmp_path)
+    text = (tmp_path / "shot.toml").read_text()
+    (tmp_path / "shot.toml").write_text(text[: text.index("[dots]")])
+    assert main(["dots", str(tmp_path / "shot.toml")]) == 2
+    assert "no [dots]" in capsys.readouterr().err
