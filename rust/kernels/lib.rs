@@ -11,7 +11,7 @@ pub mod composite_block;
 pub mod deform;
 pub mod depth;
 pub mod descriptor;
-pub mod dissect;
+pub mod elimination;
 pub mod error;
 pub mod fill;
 pub mod fit;
