@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
-    "Deformer",
     "SOURCES",
+    "Deformer",
     "average_triangles",
     "capsule_distances",
     "composite_matte",
@@ -27,7 +27,9 @@ __all__ = [
     "limb_depth",
     "limb_depths",
     "matte",
+    "over_ground",
     "own_alpha",
+    "pack_gif_frames",
     "palette_labels",
     "parse_amc",
     "parse_bvh",
@@ -83,6 +85,10 @@ def length_costs(
 def segment_stick_figure(
     gray: NDArray[np.uint8], ends: NDArray[np.float64], half_widths: NDArray[np.float64], threshold: int
 ) -> NDArray[np.uint8]: ...
+def over_ground(drawn: NDArray[np.uint8], ground: NDArray[np.uint8]) -> NDArray[np.uint8]: ...
+def pack_gif_frames(
+    frames: NDArray[np.uint8], table: NDArray[np.uint8], previous: NDArray[np.uint8] | None
+) -> list[tuple[list[int], bytes]]: ...
 def palette_labels(
     segmentation: NDArray[np.uint8], colors: NDArray[np.uint8], labels: NDArray[np.uint8], tolerance: float
 ) -> tuple[NDArray[np.uint8], int, list[int] | None]: ...

@@ -98,10 +98,10 @@ def read_puppet_input(
         bones=skeleton.bones,
         drives=skeleton.drives,
         source=str(given),
-        photo=given.suffix.lower() in (".jpg", ".jpeg") and silhouette is None,
         notes=skeleton.notes,
         segmentation=_segmentation(drawing, place, image),
         limbs=tuple(limb for limb in drawing.limbs if limb.color is not None),
+        files=(given, Path(joints), *masks, *drawing.segmentations[place : place + 1]),
     )
 
 

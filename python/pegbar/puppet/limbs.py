@@ -15,9 +15,9 @@ from pegbar.scene.puppet_input import PuppetInput
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-#: From so far along its first bone on, and so many half widths from where it hangs, a limb that touches another part of
-#: the figure is drawn beside or over it; nearer to the trunk they belong together.
-APART_FROM, APART_RADII = 0.6, 1.3
+#: A limb that touches another part of the figure beyond its first bone is drawn beside or over it; nearer to the trunk
+#: they belong together (an upper arm and a sleeve, a thigh and a skirt). A limb of one bone: from here along it.
+APART_FROM = 0.6
 #: A limb's touch that is shorter than so many of its half widths is no touch.
 LEAST_TOUCH = 0.8
 _KINDS = {"shoulder": "arm", "elbow": "arm", "hand": "arm", "hip": "leg", "knee": "leg", "foot": "leg"}
@@ -90,6 +90,5 @@ def _is_beside(source: PuppetInput, parts: Parts, chain: list[int], limbs: list[
     distances, fractions = bone_distances(places, ends)
     nearest = distances.argmin(axis=1)
     along = nearest + np.take_along_axis(fractions, nearest[:, None], axis=1)[:, 0]
-    far = np.linalg.norm(places - ends[0, 0], axis=1) > APART_RADII * parts.radii[chain[0]]
-    from_there = APART_FROM if limbs is None else 1.0
-    return bool(((along > from_there) & far).sum() > LEAST_TOUCH * parts.radii[chain].mean() + 2)
+    apart = along > (1.0 if len(chain) > 1 else APART_FROM)
+    return bool(apart.sum() > LEAST_TOUCH * parts.radii[chain].mean() + 2)
