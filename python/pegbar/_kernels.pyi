@@ -27,6 +27,8 @@ __all__ = [
     "limb_depths",
     "matte",
     "own_alpha",
+    "over_ground",
+    "pack_gif_frames",
     "palette_labels",
     "parse_amc",
     "parse_bvh",
@@ -80,6 +82,10 @@ def length_costs(
 def segment_stick_figure(
     gray: NDArray[np.uint8], ends: NDArray[np.float64], half_widths: NDArray[np.float64], threshold: int
 ) -> NDArray[np.uint8]: ...
+def over_ground(drawn: NDArray[np.uint8], ground: NDArray[np.uint8]) -> NDArray[np.uint8]: ...
+def pack_gif_frames(
+    frames: NDArray[np.uint8], table: NDArray[np.uint8], previous: NDArray[np.uint8] | None
+) -> list[tuple[list[int], bytes]]: ...
 def palette_labels(
     segmentation: NDArray[np.uint8], colors: NDArray[np.uint8], labels: NDArray[np.uint8], tolerance: float
 ) -> tuple[NDArray[np.uint8], int, list[int] | None]: ...

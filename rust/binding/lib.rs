@@ -16,6 +16,7 @@ mod holdout;
 mod kinematics;
 mod lift;
 mod matte;
+mod over;
 mod paint;
 mod palette;
 mod pose;
@@ -64,6 +65,8 @@ mod _kernels {
     use crate::lift::lift_markers;
     #[pymodule_export]
     use crate::matte::{fill_matte, has_alpha, ink_alpha, matte, own_alpha};
+    #[pymodule_export]
+    use crate::over::over_ground;
     #[pymodule_export]
     use crate::paint::{fill_polygon, stroke_polyline, unpremultiply};
     #[pymodule_export]

@@ -26,6 +26,7 @@ pub mod lanes;
 pub mod ldl;
 pub mod lift;
 pub mod matte;
+pub mod over;
 pub mod paint;
 pub mod palette;
 pub mod pinhole;

@@ -90,7 +90,7 @@ class MovementOptions:
     transition: Annotated[float, Parameter(help="Seconds from the drawn pose to the clip's first.")] = 0.0
     between: Annotated[float, Parameter(help="Seconds from one clip to the next.")] = 0.3
     loop: Annotated[bool, Parameter(negative="", help="Cut and blend so that it repeats without a jump.")] = False
-    inflation: Annotated[float, Parameter(help="How round the figure is: 0 flat, 1 as deep as wide.")] = 1.0
+    inflation: Annotated[float, Parameter(help="How round the figure is: 0 flat, 1 as deep as wide.")] = 0.5
 
     def direction(self) -> Direction:
         """As values, checked."""

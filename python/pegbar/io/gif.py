@@ -6,6 +6,7 @@ Colours are the weighted means of boxes that median cut finds, then two rounds o
 
 from __future__ import annotations
 
+import itertools
 import os
 import struct
 from collections.abc import Iterable, Iterator, Sequence
@@ -49,15 +50,13 @@ def write_gif(path: str | os.PathLike[str], frames: Iterable[ArrayLike], duratio
 
 
 def _checked(frames: Iterable[ArrayLike]) -> Iterator[Pixels]:
-    """The frames as RGBA, all of the first one's size."""
+    """The frames, all of the first one's size and channels."""
     shape: tuple[int, ...] = ()
     for index, frame in enumerate(frames):
-        picture = arrays.image(f"frames[{index}]", frame)
+        picture = arrays.image(f"frames[{index}]", frame, (shape[2],) if shape else (3, 4))
         if shape:
             arrays.same_size(f"frames[{index}]", picture, "the first frame", shape)
         shape = picture.shape
-        if shape[2] == 3:
-            picture = np.dstack([picture, np.full(shape[:2], 255, np.uint8)])
         yield picture
 
 
@@ -65,9 +64,9 @@ def _encoded(frames: Iterator[Pixels], durations: Iterator[int]) -> Iterator[byt
     """The file's bytes, piece by piece."""
     known: Scene | None = None
     previous: Pixels | None = None
-    while block := [frame for frame, _ in zip(frames, range(_BLOCK), strict=False)]:
+    while block := list(itertools.islice(frames, _BLOCK)):
         pixels = np.stack(block)
-        transparent = bool((pixels[..., 3] < 128).any())
+        transparent = pixels.shape[3] == 4 and bool((pixels[..., 3] < 128).any())
         if known is None:
             height, width = pixels.shape[1:3]
             yield b"GIF89a" + struct.pack("<HHBBB", width, height, 0x70, 0, 0)
@@ -99,7 +98,9 @@ class Scene:
 
     def __init__(self, frames: Pixels) -> None:
         looked_at = frames[np.unique(np.linspace(0, len(frames) - 1, _LOOKED_AT).astype(int))]
-        shown = looked_at[looked_at[..., 3] >= 128][:, :3]
+        # Every pixel of small pictures, every second or third of large ones.
+        stride = max(1, round((looked_at.shape[1] * looked_at.shape[2] / 1e5) ** 0.5))
+        shown = _shown(looked_at[:, ::stride, ::stride])
         if not len(shown):
             shown = np.zeros((1, 3), np.uint8)
         bins = _bins(shown)
@@ -119,13 +120,18 @@ class Scene:
 
     def unknown(self, frames: Pixels) -> float:
         """The share of the pixels of ``frames`` (F, H, W, 4) whose colours are not near any that were seen."""
-        sample = frames[::8, ::4, ::4].reshape(-1, 4)
-        sample = sample[sample[:, 3] >= 128]
+        sample = _shown(frames[::8, ::4, ::4])
         if not len(sample):
             return 0.0
         cells = self.seen.reshape(8, 4, 8, 4, 8, 4).any(axis=(1, 3, 5))
-        red, green, blue = (sample[:, :3] >> 5).T
+        red, green, blue = (sample >> 5).T
         return float(1 - cells[red, green, blue].mean())
+
+
+def _shown(frames: Pixels) -> Pixels:
+    """The colours (N, 3) of what is not transparent."""
+    pixels = frames.reshape(-1, frames.shape[-1])
+    return pixels if pixels.shape[1] == 3 else pixels[pixels[:, 3] >= 128][:, :3]
 
 
 def _bins(colours: Pixels) -> NDArray[np.intp]:

@@ -67,7 +67,7 @@ class Direction:
     transition: float = 0.0
     between: float = 0.3
     loop: bool = False
-    inflation: float = 1.0
+    inflation: float = 0.5
     shapes: str = "asap"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -22,6 +23,8 @@ from pegbar.scene.mirror import mirrored
 from pegbar.scene.motion import Motion
 
 Advance = Callable[[int, int], None]
+#: The field of view of drawings, radians: they show less perspective than a photo, whose own is found.
+DRAWN_VIEW = math.radians(20)
 #: Suffixes of clips, for folders.
 CLIP_SUFFIXES = (".bvh", ".amc", ".c3d")
 
@@ -39,7 +42,7 @@ class Casting:
     view : str, optional
     layer_order : tuple of str, optional
     field_of_view : float, optional
-        Radians.
+        Radians; None: 20 degrees for drawings, found for photos.
     mirror : bool
         Perform the clip's mirror image.
     """
@@ -115,13 +118,14 @@ def cast(part: Part, casting: Casting, direction: Direction, setting: Setting) -
     """Make a figure's puppet and let it perform its clips."""
     motions = [_clip(path, casting) for path in part.clips]
     source = read_puppet_input(part.picture, joints=casting.joints, mask=casting.mask, map=casting.drives)
+    wide = casting.field_of_view or (None if source.photo else DRAWN_VIEW)
     puppet = make_puppet(
         source,
         motions[0],
         clip=part.clips[0].stem,
         view=casting.view,  # type: ignore[arg-type]
         layer_order=casting.layer_order,
-        field_of_view=casting.field_of_view,
+        field_of_view=wide,
         background=setting.background == "completed",
     )
     return perform(puppet, motions, direction)
