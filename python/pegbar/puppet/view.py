@@ -117,7 +117,7 @@ def seen_pose(
         )
     except DegenerateError:
         fit = None
-    if fit is None or fit.error > NO_FIT * extent:
+    if fit is None or fit.error > NO_FIT * extent or _is_animal(source):
         return _as_drawn(source, motion, poses, view, field_of_view)
     poor = fit.error > POOR_FIT * extent
     choice, azimuth, found = _choice(fit, points, towards, view or (drawn_view(source) if poor else None))
@@ -129,6 +129,12 @@ def seen_pose(
         notes = (f"no pose of the clip is like the drawn one: the best, frame {frame}, is off by {error:.0f} px",)
     pose = _completed(source, moved, points[choice], camera)
     return SeenPose(camera, frame, pose, True, azimuth, found, error, notes)
+
+
+def _is_animal(source: PuppetInput) -> bool:
+    """Whether a figure lies and has other limbs than a person."""
+    trunk = source.marks[source.names.index("neck")] - source.marks[source.names.index("pelvis")]
+    return bool(abs(trunk[0]) > abs(trunk[1])) and any(name != marker for name, marker in source.drives.items())
 
 
 def _poses(source: PuppetInput, motion: Motion) -> tuple[list[int], Floats, NDArray[np.intp]]:
