@@ -71,6 +71,15 @@ Aligns the shot first where that is out of date. Writes the clip's skeleton pose
 markers (CSV, npz), a sheet to look at and a report.
 
 Example: pegbar lift my_shot/shot.toml""",
+    "secondary": """Add cloth and balls that collide with the drawn character: secondary motion, to finished frames.
+
+Aligns the shot where that is needed and out of date, finds limb boxes and collision volumes, simulates what the shot
+file's [secondary] section names, renders it, and composites it with the drawings in depth order. Only what is out of
+date is done again. Leaves passes, finished frames, an animation, a contact sheet and a report.
+
+Example: pegbar secondary my_shot/shot.toml
+
+Example: pegbar secondary my_shot/shot.toml --frames 1-24""",
     "motion": """Look at motion capture clips.""",
     "demo": """Make a sample shot from nothing and run every stage on it.
 
