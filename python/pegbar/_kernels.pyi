@@ -1,21 +1,27 @@
-from typing import Any
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
     "capsule_distances",
+    "Deformer",
+    "SOURCES",
+    "average_triangles",
     "composite_matte",
+    "constrained_delaunay",
     "convert_srgb",
     "depth_composite",
     "fill_matte",
     "fill_polygon",
     "fit_poses",
+    "fit_triangles",
     "forward_kinematics",
     "geodesic_labels",
     "grow_labels",
     "has_alpha",
     "ink_alpha",
+    "inside_rings",
     "length_costs",
     "lift_markers",
     "limb_depth",
@@ -27,6 +33,7 @@ __all__ = [
     "parse_bvh",
     "pose_distance",
     "render_passes",
+    "render_sheet",
     "resolve_passes",
     "rim_depth",
     "search_clips",
@@ -37,6 +44,8 @@ __all__ = [
     "time_warp",
     "unpremultiply",
 ]
+
+SOURCES: str
 
 _Floats = NDArray[np.float32]
 _Doubles = NDArray[np.float64]
@@ -158,3 +167,29 @@ def step_cloth(
     capsules: _Doubles,
     state: tuple[_Doubles, _Doubles],
 ) -> None: ...
+def fit_triangles(shapes: _Doubles, intermediate: _Doubles, triangles: NDArray[np.uint32]) -> _Doubles: ...
+def average_triangles(fitted: _Doubles, triangles: NDArray[np.uint32], count: int) -> _Doubles: ...
+
+@final
+class Deformer:
+    def __new__(
+        cls,
+        vertices: _Doubles,
+        triangles: NDArray[np.uint32],
+        handles: NDArray[np.uint32],
+        guides: NDArray[np.uint32],
+    ) -> Deformer: ...
+    def deform(self, positions: _Doubles, shapes: _Doubles | None, iterations: int, average: bool) -> _Doubles: ...
+
+def render_sheet(
+    vertices: _Doubles,
+    triangles: NDArray[np.uint32],
+    texture_coordinates: _Doubles,
+    texture: NDArray[np.uint8],
+    size: tuple[int, int],
+    samples: int,
+) -> NDArray[np.uint8]: ...
+def constrained_delaunay(
+    points: _Doubles, edges: NDArray[np.uint32]
+) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]: ...
+def inside_rings(places: _Doubles, rings: list[tuple[_Doubles, bool]]) -> NDArray[np.bool_]: ...

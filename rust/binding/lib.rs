@@ -6,6 +6,7 @@ mod bvh;
 mod cloth;
 mod color;
 mod composite;
+mod deform;
 mod depth;
 mod descriptor;
 mod errors;
@@ -24,6 +25,8 @@ mod rim;
 mod search;
 mod segment;
 mod signs;
+mod textured;
+mod triangulate;
 mod warp;
 
 use pyo3::prelude::*;
@@ -31,6 +34,9 @@ use pyo3::prelude::*;
 /// The Rust kernels of pegbar. Strict and private: call the functions of the `pegbar` package instead.
 #[pymodule(gil_used = false)]
 mod _kernels {
+    /// Of which sources the extension was built.
+    #[pymodule_export]
+    const SOURCES: &str = env!("PEGBAR_SOURCES");
     #[pymodule_export]
     use crate::amc::parse_amc;
     #[pymodule_export]
@@ -41,6 +47,8 @@ mod _kernels {
     use crate::color::convert_srgb;
     #[pymodule_export]
     use crate::composite::depth_composite;
+    #[pymodule_export]
+    use crate::deform::{Deformer, average_triangles, fit_triangles};
     #[pymodule_export]
     use crate::depth::limb_depth;
     #[pymodule_export]
@@ -75,6 +83,10 @@ mod _kernels {
     use crate::segment::segment_stick_figure;
     #[pymodule_export]
     use crate::signs::{length_costs, limb_depths};
+    #[pymodule_export]
+    use crate::textured::render_sheet;
+    #[pymodule_export]
+    use crate::triangulate::{constrained_delaunay, inside_rings};
     #[pymodule_export]
     use crate::warp::time_warp;
 }

@@ -154,3 +154,76 @@ def test_a_wrong_unit_is_suspected(tmp_path, capsys):
 def test_every_command_has_help_with_an_example(command, capsys):
     assert run(command, "--help") == 0
     assert f"Example: pegbar {command}" in " ".join(capsys.readouterr().out.split())
+
+
+CLIP = """\
+HIERARCHY
+ROOT Hips
+{
+  OFFSET 0 0 0
+  CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+  JOINT Neck
+  {
+    OFFSET 0 0.5 0
+    CHANNELS 3 Zrotation Xrotation Yrotation
+    JOINT LeftForeArm
+    {
+      OFFSET 0.4 0 0
+      CHANNELS 3 Zrotation Xrotation Yrotation
+      JOINT LeftHand
+      {
+        OFFSET 0.3 0 0
+        CHANNELS 3 Zrotation Xrotation Yrotation
+        End Site
+        {
+          OFFSET 0.1 0 0
+        }
+      }
+    }
+  }
+}
+MOTION
+Frames: 2
+Frame Time: 0.04
+0 1 0 0 0 0 0 0 0 0 0 0 0 0 0
+0 1 0 0 0 0 0 0 0 0 0 0 0 0 0
+"""
+
+
+@pytest.mark.parametrize(
+    ("extra", "words"),
+    [
+        ('[clip]\npath = "none.bvh"\n', ("clip: ", "none.bvh")),
+        ('[clip]\npath = "marks.json"\n', ("clip: ", "marks.json")),
+        ('[clip]\npath = "walk.bvh"\nunit = 1.0\nstart = 9\n', ("clip.start", "2 frames")),
+        ('[clip]\nfolder = "nowhere"\n', ("clip.folder", "no such folder")),
+        ('[clip]\nfolder = "empty"\n', ("clip.folder", "no .bvh")),
+        ('[lift]\nskeleton = "hero.bvh"\n', ("lift.skeleton", "hero.bvh")),
+    ],
+)
+def test_what_would_stop_align_and_lift_is_told(tmp_path, capsys, extra, words):
+    shot = make_shot(tmp_path, extra="\n" + extra)
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "walk.bvh").write_text(CLIP)
+    assert run("check", shot) == 1
+    lines = capsys.readouterr().err.splitlines()
+    assert [line for line in lines if all(word in line for word in words)], lines
+
+
+def test_drawings_with_too_few_marks_and_clips_that_lack_joints_are_told(tmp_path, capsys):
+    shot = make_shot(tmp_path, extra='\n[clip]\npath = "walk.bvh"\nunit = 1.0\n')
+    (tmp_path / "walk.bvh").write_text(CLIP.replace("LeftForeArm", "Gadget"))
+    marks = read_annotations(tmp_path / "marks.json")
+    visible = marks.visible.copy()
+    visible[1, 0] = False
+    write_annotations(tmp_path / "marks.json", dataclasses.replace(marks, visible=visible))
+    assert run("check", shot) == 1
+    text = capsys.readouterr().err
+    assert "drawing 2: fewer than four joints" in text
+    assert "fewer than four of the drawing's joints" in text
+
+
+def test_a_full_disk_is_told(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("shutil.disk_usage", lambda _: type("Usage", (), {"free": 1000})())
+    assert run("check", make_shot(tmp_path)) == 1
+    assert "GB left" in capsys.readouterr().err

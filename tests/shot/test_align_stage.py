@@ -150,3 +150,20 @@ def test_a_broken_alignment_is_named(tmp_path):
     np.savez(tmp_path / "b.npz", names=["x"])
     with pytest.raises(FormatError, match=r"b\.npz"):
         read_alignment(tmp_path / "b.npz")
+
+
+def test_the_report_has_a_section_for_each_stage_that_has_run(made, capsys):
+    page = made.parent / "pages" / "report.html"
+    assert main(["report", str(made), "-o", str(page)]) == 0
+    text = page.read_text(encoding="utf-8")
+    assert "in " in capsys.readouterr().out
+    titles = ("The shot", "Alignment", "Lift", "Secondary motion")
+    assert [title for title in titles if f"<h2>{title}</h2>" in text] == ["The shot", "Alignment"]
+    assert text.count("data:image/png;base64,") in (3, 4)  # 4 after a test has made a depth picture
+    assert "Out of date" not in text
+    assert "http" not in text
+    settings = made.read_text()
+    made.write_text(settings + "\n[align]\nsmoothing = 3\n")
+    assert main(["report", str(made), "-o", str(page)]) == 0
+    assert "Out of date" in page.read_text(encoding="utf-8")
+    made.write_text(settings)

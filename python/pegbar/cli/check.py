@@ -15,6 +15,7 @@ from pegbar.errors import ShotError
 from pegbar.io.numbers import format_frames
 from pegbar.shot.batch import run_frames
 from pegbar.shot.check import CheckStage
+from pegbar.shot.check_sections import section_problems
 from pegbar.shot.plan import open_shot
 
 
@@ -42,7 +43,7 @@ def check(
         for result in results:
             advance()
             problems[result.frame] = [result.error] if result.error else list(result.value)
-    lines = grouped([line for frame in sorted(problems) for line in problems[frame]])
+    lines = section_problems(plan) + grouped([line for frame in sorted(problems) for line in problems[frame]])
     for line in lines:
         print(line, file=sys.stderr)
     print(f"check: {len(chosen)} frames read, {len(lines) or 'no'} problem{'' if len(lines) == 1 else 's'}")

@@ -67,8 +67,9 @@ pegbar depth and composite then use.
 Example: pegbar align my_shot/shot.toml""",
     "lift": """Make a 3D animation of a drawn sequence, with the artist's poses and timing.
 
-Aligns the shot first where that is out of date. Writes the clip's skeleton posed as drawn (BVH, glTF, USD), the 3D
-markers (CSV, npz), a sheet to look at and a report.
+Aligns the shot first where that is out of date. Writes a skeleton posed as drawn (BVH, glTF, USD), the 3D markers
+(CSV, npz), a sheet and an animation to look at, and a report. The shot file's [lift] chooses the skeleton (the clip's or
+your rig's), the frame rate, loops, standing feet, held joints, and limbs whose depth is to be turned.
 
 Example: pegbar lift my_shot/shot.toml""",
     "secondary": """Add cloth and balls that collide with the drawn character: secondary motion, to finished frames.
@@ -80,6 +81,20 @@ date is done again. Leaves passes, finished frames, an animation, a contact shee
 Example: pegbar secondary my_shot/shot.toml
 
 Example: pegbar secondary my_shot/shot.toml --frames 1-24""",
+    "animate": """Let a drawn or photographed figure perform a motion capture clip.
+
+Joints are found beside the picture: AnimatedDrawings' char_cfg.yaml, our annotations or COCO keypoints; a mask as well.
+Writes GIF, APNG, WebP, numbered PNG files, and with pegbar[video] MP4, ProRes 4444 (.mov) or WebM. Several pictures
+stand in one scene; several clips are performed in a row. With a folder to write to, every picture performs every clip.
+
+Example: pegbar animate texture.png --clip walk.bvh -o walk.gif --size 500x500
+
+Example: pegbar animate drawings --clip clips -o animations --format mp4""",
+    "report": """Write one HTML page with overlays, plots and figures of every stage that has run.
+
+It opens offline, in any browser.
+
+Example: pegbar report my_shot/shot.toml""",
     "motion": """Look at motion capture clips.""",
     "demo": """Make a sample shot from nothing and run every stage on it.
 

@@ -28,7 +28,10 @@ def read_alignment(path: str | os.PathLike[str]) -> Alignment:
     """Read what `write_alignment` wrote; FormatError for a file that is broken or something else."""
     try:
         with open(path, "rb") as file, np.load(file, allow_pickle=False) as held:
-            values: dict[str, Any] = {field.name: held[field.name] for field in fields(Alignment)}
+            lacking = {"warnings": np.array([], np.str_)} if "warnings" not in held else {}
+            values: dict[str, Any] = lacking | {
+                f.name: held[f.name] for f in fields(Alignment) if f.name not in lacking
+            }
     except (zipfile.BadZipFile, KeyError, ValueError, EOFError) as error:
         raise FormatError(path, f"no alignment: {error}") from None
     for name in _TEXTS:

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 import cv2
-import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pegbar import arrays
 from pegbar.io import atomic
+from pegbar.io.gif import write_gif
 
 _SUFFIXES = (".png", ".apng", ".webp", ".gif")
 _TO_BGRA = {3: cv2.COLOR_RGB2BGRA, 4: cv2.COLOR_RGBA2BGRA}
@@ -27,7 +28,7 @@ def write_animation(path: str | os.PathLike[str], frames: Iterable[ArrayLike], f
     path : path
         .png or .apng (APNG, exact), .webp (lossless) or .gif (256 colours, alpha on or off).
     frames : iterable of (H, W, 3|4) uint8
-        RGB or straight RGBA pictures of one size. All are held in memory.
+        RGB or straight RGBA pictures of one size. All are held in memory, but for a GIF.
     frame_rate : float
         Frames a second. Times are whole milliseconds (GIF: hundredths) and do not drift.
 
@@ -43,6 +44,9 @@ def write_animation(path: str | os.PathLike[str], frames: Iterable[ArrayLike], f
         raise ValueError(f"path: want a suffix of {', '.join(_SUFFIXES)}, got {suffix!r}")
     if not 0 < frame_rate < math.inf:
         raise ValueError(f"frame_rate: want frames a second above 0, got {frame_rate}")
+    if suffix == ".gif":
+        write_gif(path, frames, (duration // 10 for duration in _durations(frame_rate, 10)))
+        return
     pictures: list[NDArray[Any]] = []
     for index, frame in enumerate(frames):
         picture = arrays.image(f"frames[{index}]", frame)
@@ -53,7 +57,7 @@ def write_animation(path: str | os.PathLike[str], frames: Iterable[ArrayLike], f
         raise ValueError("frames: want at least one")
     animation = cv2.Animation()
     animation.frames = pictures
-    animation.durations = _durations(len(pictures), frame_rate, 10 if suffix == ".gif" else 1).tolist()
+    animation.durations = list(itertools.islice(_durations(frame_rate, 1), len(pictures)))
     options = [cv2.IMWRITE_WEBP_QUALITY, 101] if suffix == ".webp" else []
     good, encoded = cv2.imencodeanimation(".png" if suffix == ".apng" else suffix, animation, options)
     if not good:
@@ -61,7 +65,10 @@ def write_animation(path: str | os.PathLike[str], frames: Iterable[ArrayLike], f
     atomic.write_bytes(path, encoded.data)
 
 
-def _durations(count: int, frame_rate: float, step: int) -> NDArray[np.int32]:
-    """Milliseconds of each frame, multiples of ``step``, whose sums follow the true times."""
-    times = np.rint(np.arange(count + 1) * (1000 / frame_rate / step)) * step
-    return np.asarray(np.maximum(np.diff(times), step), np.int32)
+def _durations(frame_rate: float, step: int) -> Iterator[int]:
+    """Milliseconds of each frame, multiples of ``step``, whose sums follow the true times; without end."""
+    shown = 0
+    for count in itertools.count(1):
+        duration = max(round(count * 1000 / frame_rate / step) * step - shown, step)
+        shown += duration
+        yield duration

@@ -100,6 +100,8 @@ def read_puppet_input(
         source=str(given),
         photo=given.suffix.lower() in (".jpg", ".jpeg") and silhouette is None,
         notes=skeleton.notes,
+        segmentation=_segmentation(drawing, place, image),
+        limbs=tuple(limb for limb in drawing.limbs if limb.color is not None),
     )
 
 
@@ -110,6 +112,17 @@ def _frame(drawing: Drawing, picture: Path | None, frame: int | None) -> int:
         return frame
     names = [path.name for path in drawing.images]
     return names.index(picture.name) if picture is not None and picture.name in names else 0
+
+
+def _segmentation(drawing: Drawing, place: int, image: NDArray[np.uint8]) -> NDArray[np.uint8] | None:
+    """The picture painted in the limbs' colours, where there is one of the picture's size."""
+    if len(drawing.segmentations) <= place or not any(limb.color for limb in drawing.limbs):
+        return None
+    painted = read_picture(drawing.segmentations[place])
+    if painted.shape[:2] != image.shape[:2]:
+        wanted = f"{image.shape[1]} x {image.shape[0]}"
+        raise FormatError(drawing.segmentations[place], f"is {painted.shape[1]} x {painted.shape[0]}; want {wanted}")
+    return np.ascontiguousarray(painted[..., :3])
 
 
 def _mask(path: Path, image: NDArray[np.uint8], picture: Path) -> NDArray[np.bool_]:

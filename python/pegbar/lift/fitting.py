@@ -75,7 +75,7 @@ def fit_skeleton(skeleton: Motion, markers: ArrayLike, names: Sequence[str], *, 
         tips.setdefault(joint, tips.get(parent, whole))
         ratios[joint] = float(np.mean(told)) if told else tips[parent]
         step = ratios[joint] * (rest.positions[0, joint] - rest.positions[0, parent])
-        places[joint] = places[parent] + (grown[joint] if joint in grown else step)
+        places[joint] = places[parent] + grown.get(joint, step)
     ends = {name: tips.get(rest.names.index(name), whole) * np.asarray(end) for name, end in rest.ends.items()}
     return rest.changed(positions=places[None], rest=None if rest.rest is None else places, ends=ends)
 

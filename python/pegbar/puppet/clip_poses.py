@@ -7,8 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
 
 from pegbar.errors import DegenerateError
+from pegbar.puppet.retarget import facing_turn
 from pegbar.scene.clip import interpolate
 from pegbar.scene.motion import Motion
 from pegbar.scene.puppet import Puppet
@@ -19,9 +21,7 @@ USUAL_RATE = 30.0
 _HALVES = {"pelvis": "hip", "neck": "shoulder"}
 
 
-def clip_times(
-    motion: Motion, first: int | None, last: int | None, frame_rate: float | None
-) -> tuple[Floats, float]:
+def clip_times(motion: Motion, first: int | None, last: int | None, frame_rate: float | None) -> tuple[Floats, float]:
     """Return the clip's frames (F,), in fractions, at the pictures' times, and the pictures' rate.
 
     ``first`` and ``last`` count from 0 and are both shown; without them an inserted T-pose is left out. Without
@@ -65,6 +65,20 @@ def clip_markers(puppet: Puppet, motion: Motion, times: ArrayLike) -> Floats:
         if marker in tracks:
             result[:, joint] = interpolate(tracks[marker][:, None], times)[:, 0]
     return result
+
+
+def continued(puppet: Puppet, markers: Floats, before: Floats) -> Floats:
+    """Return ``markers`` (F, J, 3) turned and moved so that they go on where ``before`` (G, J, 3) ends.
+
+    The person faces the same way; the lowest joint is on the same floor (the fifth percentile of its heights).
+    """
+    turn = facing_turn(puppet, markers[:1], before[-1])[0]
+    turned = Rotation.from_euler("y", -turn, degrees=True).apply(markers.reshape(-1, 3)).reshape(markers.shape)
+    floors = [np.percentile(np.nanmin(clip[:, :, 1], axis=1), 5) for clip in (turned, before)]
+    root = int(np.flatnonzero(puppet.parents < 0)[0])
+    move = before[-1, root] - turned[0, root]
+    move[1] = floors[1] - floors[0]
+    return turned + move
 
 
 def marker_names(motion: Motion) -> Sequence[str]:

@@ -1,22 +1,44 @@
-"""From a picture with joints and a clip to a puppet (Hornung et al. 2007, sections 5 and 6)."""
+"""From a picture with joints and a clip to a puppet (Hornung et al. 2007, sections 5 and 6).
+
+Three steps, so that what a picture needs once is not done for every clip: `prepare_figure` finds where the figure and
+its bones are; `plan_figure` what a clip makes of it (camera, pose, layers); `build_puppet` cuts, meshes and paints the
+layers.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from pegbar.puppet.inpaint import Completion, Method
-from pegbar.puppet.layers import Layer
+from pegbar.puppet.check import Pieces, checked
+from pegbar.puppet.inpaint import Completion, Method, complete
+from pegbar.puppet.layers import LayerPlan, cut_layers, plan_layers
+from pegbar.puppet.limbs import drawn_limbs
 from pegbar.puppet.mesh import layered_mesh, mesh_spacing
-from pegbar.puppet.parts import grow_parts
-from pegbar.puppet.texture import layer_textures, mask_alpha
-from pegbar.puppet.view import View, seen_pose
+from pegbar.puppet.parts import Parts, grow_parts
+from pegbar.puppet.texture import layer_textures
+from pegbar.puppet.view import SeenPose, View, seen_pose
+from pegbar.scene.drawn_skeleton import limb_chains
 from pegbar.scene.motion import Motion
 from pegbar.scene.puppet import Puppet
 from pegbar.scene.puppet_input import PuppetInput
+
+#: The share of a limb's half width that outlines may take.
+_RIM = 0.3
+#: So many half widths of a limb around the figure the background is completed too: shadows and soft edges.
+_MARGIN = 0.35
+
+
+@dataclass(frozen=True, eq=False)
+class FigurePlan:
+    """What a clip makes of a figure: how it is ``seen``, and its ``layers``."""
+
+    seen: SeenPose
+    layers: LayerPlan
 
 
 def make_puppet(
@@ -28,7 +50,8 @@ def make_puppet(
     layer_order: Sequence[str] | None = None,
     field_of_view: float | None = None,
     completion: Method | Completion = "auto",
-    background: bool = True,
+    background: bool = False,
+    pieces: Pieces = "join",
 ) -> Puppet:
     """Make a puppet of the figure in a picture: camera and pose from a clip, layers, mesh, textures.
 
@@ -46,57 +69,119 @@ def make_puppet(
         Layers front to back, where another order than found is wanted.
     field_of_view : float, optional
         Horizontal, radians; None finds one near the usual.
-    completion : {"auto", "patch", "diffuse"} or function
+    completion : {"auto", "patch", "diffuse", "flat"} or function
         How hidden parts are filled in: see `pegbar.puppet.inpaint.complete`.
     background : bool
-        Whether the picture behind the figure is completed as well.
+        Whether the picture behind the figure is completed as well; it takes seconds. Nothing is behind a figure whose
+        picture is transparent round it.
+    pieces : {"join", "drop"}
+        What is done with pieces of the mask that no bone runs through.
+
+    Returns
+    -------
+    Puppet
 
     Raises
     ------
     ValueError
-        For a wrong option, or a clip that moves too few of the joints.
+        For a wrong option, joints outside the mask, or a clip that moves too few of the joints.
     """
-    seen = seen_pose(source, motion, view=view, field_of_view=field_of_view)
-    mask = source.mask
-    assert mask is not None
-    parts = grow_parts(source, mask)
-    layers = [Layer("body", tuple(range(len(source.bones))), mask, mask)]
-    spacing = mesh_spacing(float(mask.sum()))
-    mesh = layered_mesh(source, layers, parts.bones, spacing)
-    textures = layer_textures(source.image[..., :3], figure_alpha(source), layers, completion)
+    figure = prepare_figure(source, pieces=pieces)
+    plan = plan_figure(figure, motion, view=view, layer_order=layer_order, field_of_view=field_of_view)
+    return build_puppet(figure, plan, clip=clip, completion=completion, background=background)
+
+
+def prepare_figure(source: PuppetInput, *, pieces: Pieces = "join") -> PuppetInput:
+    """Return the figure with what does not depend on a clip: a mended mask, its coverage, and where its bones are.
+
+    Parameters and errors are those of `make_puppet`; a figure that is prepared already is returned as it is.
+    """
+    if source.bone_map is not None:
+        return source
+    figure = checked(source, pieces=pieces)
+    assert figure.mask is not None
+    parts = grow_parts(figure, figure.mask)
+    return dataclasses.replace(figure, bone_map=parts.bones, radii=parts.radii)
+
+
+def plan_figure(
+    figure: PuppetInput,
+    motion: Motion,
+    *,
+    view: View | None = None,
+    layer_order: Sequence[str] | None = None,
+    field_of_view: float | None = None,
+) -> FigurePlan:
+    """Return how a prepared figure is seen in a clip, and the layers that this makes; as `make_puppet`."""
+    seen = seen_pose(figure, motion, view=view, field_of_view=field_of_view)
+    limbs = drawn_limbs(figure, _parts(figure), seen)
+    return FigurePlan(seen, plan_layers(len(figure.bones), limbs, seen.view, layer_order))
+
+
+def build_puppet(
+    figure: PuppetInput,
+    plan: FigurePlan,
+    *,
+    clip: str = "",
+    completion: Method | Completion = "auto",
+    background: bool = False,
+) -> Puppet:
+    """Return the puppet of a prepared figure and a plan: layers cut, meshed and painted; as `make_puppet`."""
+    assert figure.mask is not None
+    assert figure.alpha is not None
+    parts, image = _parts(figure), np.ascontiguousarray(figure.image[..., :3])
+    layers = cut_layers(figure, figure.mask, parts, plan.layers)
+    mesh = layered_mesh(figure, layers, parts.bones, mesh_spacing(float(figure.mask.sum())))
+    thick = _limb_radius(figure, parts)
+    behind = None
+    if background and (figure.image.shape[2] == 3 or figure.image[..., 3].min() >= 128):
+        size = 2 * max(1, round(_MARGIN * thick)) + 1
+        hole = cv2.dilate((figure.alpha > 0).view(np.uint8), np.ones((size, size), np.uint8)).astype(bool)
+        behind = complete(image, hole, completion) if not hole.all() else None
     return Puppet(
-        names=source.names,
-        marks=source.marks,
-        bones=source.bones,
-        drives=source.drives,
+        names=figure.names,
+        marks=figure.marks,
+        bones=figure.bones,
+        drives=figure.drives,
         layers=tuple(layer.name for layer in layers),
-        textures=textures,
-        background=None,
-        camera=seen.camera,
-        pose=seen.pose,
-        view=seen.view,
-        image_size=source.image_size,
-        pose_frame=seen.frame,
-        clip=clip,
-        fitted=seen.fitted,
-        bone_layer=_bone_layers(layers, len(source.bones)),
-        notes=(*source.notes, *seen.notes),
+        textures=layer_textures(image, figure.alpha, layers, completion, rim=_RIM * thick),
+        background=behind,
+        bone_layer=plan.layers.bone_layer,
+        notes=(),
+        camera=plan.seen.camera,
+        pose=plan.seen.pose,
+        view=plan.seen.view,
+        image_size=figure.image_size,
         **vars(mesh),
-    )
+    ).changed(**_seen_fields(figure, plan, clip))
 
 
-def figure_alpha(source: PuppetInput) -> NDArray[np.float32]:
-    """The figure's coverage (H, W) in 0..1: the picture's own alpha, else the mask's with a smooth outline."""
-    assert source.mask is not None
-    if source.image.shape[2] == 4 and source.image[..., 3].min() < 128:
-        own = source.image[..., 3].astype(np.float32) / 255
-        near = cv2.dilate(source.mask.view(np.uint8), np.ones((5, 5), np.uint8))
-        return np.where(near, own, 0).astype(np.float32)
-    return mask_alpha(source.mask)
+def pose_again(puppet: Puppet, figure: PuppetInput, plan: FigurePlan, *, clip: str = "") -> Puppet:
+    """Return ``puppet`` as another clip shows it, whose plan has the same layers."""
+    return puppet.changed(**_seen_fields(figure, plan, clip))
 
 
-def _bone_layers(layers: Sequence[Layer], count: int) -> NDArray[np.int64]:
-    owner = np.zeros(count, np.int64)
-    for index, layer in enumerate(layers):
-        owner[list(layer.bones)] = index
-    return owner
+def _seen_fields(figure: PuppetInput, plan: FigurePlan, clip: str) -> dict[str, object]:
+    seen = plan.seen
+    return {
+        "camera": seen.camera,
+        "pose": seen.pose,
+        "view": seen.view,
+        "pose_frame": seen.frame,
+        "fitted": seen.fitted,
+        "drives": figure.drives,
+        "clip": clip,
+        "notes": (*figure.notes, *seen.notes),
+    }
+
+
+def _parts(figure: PuppetInput) -> Parts:
+    assert figure.bone_map is not None
+    assert figure.radii is not None
+    return Parts(figure.bone_map, figure.radii)
+
+
+def _limb_radius(figure: PuppetInput, parts: Parts) -> float:
+    """How thick the figure's limbs are: half their usual width, in pixels."""
+    limbs = [bone for chain in limb_chains(figure.names, figure.bones) for bone in chain]
+    return float(np.median(parts.radii[limbs or slice(None)]))

@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 
 from pegbar.puppet.layers import Layer
 from pegbar.puppet.outline import outlines
+from pegbar.puppet.parts import bone_distances
 from pegbar.scene.puppet_input import PuppetInput
 
 Floats = NDArray[np.float64]
@@ -181,7 +182,7 @@ class _Builder:
             own = np.array(layer.bones, np.int64)
             strange = np.flatnonzero((layer_of == index) & ~np.isin(owner, own))
             ends = self.source.marks[self.source.bones[own]]
-            owner[strange] = own[np.argmin(_distances(centres[strange], ends), axis=1)]
+            owner[strange] = own[np.argmin(bone_distances(centres[strange], ends)[0], axis=1)]
         return owner
 
 
@@ -202,15 +203,6 @@ def _grid(region: Flags, spacing: float, known: Floats) -> Floats:
 def _holds(region: Flags, place: Floats) -> bool:
     x, y = round(float(place[0])), round(float(place[1]))
     return 0 <= y < region.shape[0] and 0 <= x < region.shape[1] and bool(region[y, x])
-
-
-def _distances(points: Floats, ends: Floats) -> Floats:
-    """Distances (N, V) of points (N, 2) from segments (V, 2, 2)."""
-    start, along = ends[:, 0], ends[:, 1] - ends[:, 0]
-    squared = np.maximum((along**2).sum(axis=1), 1e-12)
-    part = (((points[:, None] - start) * along).sum(axis=2) / squared).clip(0, 1)
-    distances: Floats = np.linalg.norm(points[:, None] - start - part[..., None] * along, axis=2)
-    return distances
 
 
 def _triangulate(points: Floats, outer: Sequence[Floats], holes: Sequence[Floats]) -> Ints:

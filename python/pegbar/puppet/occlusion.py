@@ -105,8 +105,10 @@ def _crossings(
     ends = [bones[pieces.bones[chosen]] for chosen in (first, second)]
     a0, a1, b0, b1 = (pixels[:, pair[:, end]] for pair in ends for end in (0, 1))
     near_a, near_b, distance = nearest_points(a0, a1 - a0, b0, b1 - b0)
-    depth = [depths[:, pair[:, 0]] * (1 - share) + depths[:, pair[:, 1]] * share
-             for pair, share in zip(ends, (near_a, near_b), strict=True)]
+    depth = [
+        depths[:, pair[:, 0]] * (1 - share) + depths[:, pair[:, 1]] * share
+        for pair, share in zip(ends, (near_a, near_b), strict=True)
+    ]
     behind = depth[1] - depth[0]
     # Bones that meet at a joint are nearest there, at no distance: the rest of the bones tells.
     meeting = (ends[0][:, :, None] == ends[1][:, None, :]).any(axis=(1, 2))

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pegbar.puppet.asap import AsapShapes
-from pegbar.puppet.clip_poses import clip_markers, clip_times, marker_names
+from pegbar.puppet.clip_poses import clip_markers, clip_times, continued
 from pegbar.puppet.deform import Deformer
 from pegbar.puppet.drawn_pose import drawn_pose
 from pegbar.puppet.occlusion import Pieces, piece_ranks
@@ -23,6 +24,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 #: Degrees by which a figure may turn away from its drawn view before the picture no longer shows what would be seen.
 PAST_VIEW = 60.0
+#: Cameras, and ways to deform, that `Direction` knows.
+CAMERAS, SHAPES = ("still", "following"), ("asap", "arap")
 # Frames deformed at a time.
 _BLOCK = 32
 
@@ -45,6 +48,8 @@ class Direction:
         A following camera goes along with a travelling figure.
     transition : float
         Seconds from the drawn pose to the clip's first one; 0 for none.
+    between : float
+        Seconds from one clip's last pose to the next one's first.
     loop : bool
         Cut and blend the movement so that it repeats without a jump.
     inflation : float
@@ -60,6 +65,7 @@ class Direction:
     travel: str = "auto"
     camera: str = "still"
     transition: float = 0.0
+    between: float = 0.3
     loop: bool = False
     inflation: float = 1.0
     shapes: str = "asap"
@@ -69,68 +75,50 @@ class Direction:
 class Performance:
     """What `perform` returns: F frames of a puppet in motion.
 
-    ``poses`` (F, J, 3) are world metres as the puppet's camera sees them, ``ranks`` (F, P) the order of `pieces`, 0 the
-    farthest, ``shift`` (F, 2) by how many pixels what stands still moves through a following camera's picture, and
-    ``notes`` what a user should know.
+    Attributes
+    ----------
+    puppet : Puppet
+    poses : (F, J, 3) float
+        World metres, as the puppet's camera sees them.
+    meshes : (F, n, 2) float
+        The puppet's vertices in pixels of its picture.
+    pieces : Pieces
+    ranks : (F, P) int
+        The order of the pieces, 0 the farthest.
+    frame_rate : float
+    shift : (F, 2) float
+        By how many pixels what stands still moves through a following camera's picture.
+    notes : tuple of str
+        What a user should know.
     """
 
     puppet: Puppet
     poses: Floats
-    ranks: Ints
+    meshes: Floats
     pieces: Pieces
+    ranks: Ints
     frame_rate: float
     shift: Floats
     notes: tuple[str, ...]
-    asap: AsapShapes
-    deformer: Deformer
-    arap: bool = False
 
     def __len__(self) -> int:
         return len(self.poses)
-
-    def meshes(self, start: int = 0, stop: int | None = None) -> Iterator[Floats]:
-        """Give the vertices (n, 2) of each frame in pixels of the picture."""
-        stop = len(self) if stop is None else stop
-        for block in range(start, stop, _BLOCK):
-            yield from self._deformed(self.poses[block : min(block + _BLOCK, stop)])
 
     def triangle_depths(self, frame: int) -> Floats:
         """Return a depth (T,) for every triangle in ``frame``: larger is farther, alike within a piece."""
         depths: Floats = -self.ranks[frame][self.pieces.of_triangle].astype(np.float64)
         return depths
 
-    def handles(self, poses: Floats) -> Floats:
-        """Return where (F, h, 2) the handles are in ``poses`` (F, J, 3)."""
-        return handle_points(self.puppet, poses) + self._off_bone
 
-    @property
-    def _off_bone(self) -> Floats:
-        """How far (h, 2) handles lie beside their bones as drawn: mesh vertices are not exactly on them."""
-        rest = drawn_pose(self.puppet)
-        return self.puppet.vertices[self.puppet.handles] - handle_points(self.puppet, rest[None])[0]
-
-    def _deformed(self, poses: Floats) -> Floats:
-        if self.arap:
-            return self.deformer.deform_many(self.handles(poses))
-        shapes = self.asap.shapes(poses)[:, self.puppet.triangles]
-        return self.deformer.deform_many(self.handles(poses), shapes=shapes)
-
-
-def handle_points(puppet: Puppet, poses: Floats) -> Floats:
-    """Return the pixels (F, h, 2) of the points on the bones of ``poses`` (F, J, 3) that handles stand for."""
-    parents, children = puppet.bones[puppet.handle_bone].T
-    share = puppet.handle_fraction[:, None]
-    return puppet.camera.project(poses[:, parents] * (1 - share) + poses[:, children] * share)
-
-
-def perform(puppet: Puppet, motion: Motion, direction: Direction | None = None) -> Performance:
+def perform(puppet: Puppet, motion: Motion | Sequence[Motion], direction: Direction | None = None) -> Performance:
     """Move a puppet as a clip moves.
 
     Parameters
     ----------
     puppet : Puppet
         Made with this clip (`make_puppet`), which set its camera.
-    motion : Motion
+    motion : Motion or sequence of Motion
+        Several are performed one after another; the puppet was made with the first.
     direction : Direction, optional
 
     Returns
@@ -145,49 +133,95 @@ def perform(puppet: Puppet, motion: Motion, direction: Direction | None = None) 
         For joints that are missing throughout the clip, or a figure that walks into the camera.
     """
     direction = direction or Direction()
+    if direction.camera not in CAMERAS or direction.shapes not in SHAPES:
+        raise ValueError(f"direction: want a camera of {', '.join(CAMERAS)} and shapes of {', '.join(SHAPES)}")
     rest = drawn_pose(puppet)
-    times, rate = clip_times(motion, direction.first, direction.last, direction.frame_rate)
-    markers, reference = clip_markers(puppet, motion, times), clip_markers(puppet, motion, [puppet.pose_frame])[0]
-    scale = body_scale(puppet, rest, reference)
-    poses = retarget(puppet, rest, markers, reference, keep=direction.keep)
-    poses = ground_poses(poses, markers, rest, reference, scale)
-    root = int(np.flatnonzero(puppet.parents < 0)[0])
-    way = horizontal_path(markers[:, root], reference[root], scale, direction.travel)
-    notes = [*_turned_notes(puppet, markers, reference, times)]
+    motions = (motion,) if isinstance(motion, Motion) else tuple(motion)
+    poses, way, rate, notes = _joined(puppet, rest, motions, direction)
     if direction.loop:
         poses, length = closed_loop(puppet.bones, poses, rate)
         way = way[:length]
-    poses, way = _with_transition(puppet, rest, poses, way, round(direction.transition * rate))
+    count = round(direction.transition * rate)
+    if count > 0:
+        poses = np.concatenate([_between(puppet, rest, poses[0], count), poses])
+        way = np.concatenate([np.append(ease(count), 1.0)[:, None] * way[0], way])
     gone = follow(way, rate) if direction.camera == "following" else np.zeros_like(way)
     poses = poses + (way - gone)[:, None]
-    home = puppet.camera.project(rest[root])
-    shift = puppet.camera.project(rest[root] - gone) - home
+    root = root_joint(puppet)
     pieces = Pieces.of_puppet(puppet)
-    ranks = piece_ranks(pieces, puppet.bones, puppet.camera, poses)
     return Performance(
         puppet=puppet,
         poses=poses,
-        ranks=ranks,
+        meshes=deformed_meshes(puppet, rest, poses, direction),
         pieces=pieces,
+        ranks=piece_ranks(pieces, puppet.bones, puppet.camera, poses),
         frame_rate=rate,
-        shift=shift,
-        notes=tuple(notes),
-        asap=AsapShapes.of_puppet(puppet, rest, inflation=direction.inflation),
-        deformer=Deformer(puppet.vertices, puppet.triangles, puppet.handles),
-        arap=direction.shapes == "arap",
+        shift=puppet.camera.project(rest[root] - gone) - puppet.marks[root],
+        notes=notes,
     )
 
 
-def _with_transition(
-    puppet: Puppet, rest: Floats, poses: Floats, way: Floats, count: int
-) -> tuple[Floats, Floats]:
-    """The poses and the way with ``count`` frames before them that lead there from the drawn pose."""
-    if count < 1:
-        return poses, way
-    shares = ease(count)
-    before = blend_poses(puppet.bones, rest, poses[0], shares)
-    arrival = shares[:, None] * way[0]
-    return np.concatenate([rest[None], before, poses]), np.concatenate([0 * way[:1], arrival, way])
+def deformed_meshes(puppet: Puppet, rest: Floats, poses: Floats, direction: Direction) -> Floats:
+    """Return the mesh (F, n, 2) in ``poses`` (F, J, 3); as drawn it shows the pose ``rest`` (J, 3)."""
+    deformer = Deformer(puppet.vertices, puppet.triangles, puppet.handles)
+    asap = AsapShapes.of_puppet(puppet, rest, inflation=direction.inflation)
+    # Mesh vertices are not exactly on the bones.
+    beside = puppet.vertices[puppet.handles] - handle_points(puppet, rest[None])[0]
+    meshes = np.empty((len(poses), len(puppet.vertices), 2))
+    for start in range(0, len(poses), _BLOCK):
+        block = poses[start : start + _BLOCK]
+        shapes = asap.shapes(block)[:, puppet.triangles] if direction.shapes == "asap" else None
+        meshes[start : start + _BLOCK] = deformer.deform_many(handle_points(puppet, block) + beside, shapes=shapes)
+    return meshes
+
+
+def handle_points(puppet: Puppet, poses: Floats) -> Floats:
+    """Return the pixels (F, h, 2) of the points on the bones of ``poses`` (F, J, 3) that handles stand for."""
+    parents, children = puppet.bones[puppet.handle_bone].T
+    share = puppet.handle_fraction[:, None]
+    return puppet.camera.project(poses[:, parents] * (1 - share) + poses[:, children] * share)
+
+
+def root_joint(puppet: Puppet) -> int:
+    """The joint that hangs on no other."""
+    return int(np.flatnonzero(puppet.parents < 0)[0])
+
+
+def _joined(
+    puppet: Puppet, rest: Floats, motions: Sequence[Motion], direction: Direction
+) -> tuple[Floats, Floats, float, tuple[str, ...]]:
+    """Poses (F, J, 3) over the drawn place, the way (F, 3) from there, the rate, and notes, of clips in a row."""
+    if not motions:
+        raise ValueError("motion: want at least one clip")
+    reference = clip_markers(puppet, motions[0], [puppet.pose_frame])[0]
+    scale, root = body_scale(puppet, rest, reference), root_joint(puppet)
+    rate, before = direction.frame_rate, None
+    poses, ways, notes = [], [], []
+    for number, motion in enumerate(motions):
+        alone = direction if len(motions) == 1 else dataclasses.replace(direction, first=None, last=None)
+        times, rate = clip_times(motion, alone.first, alone.last, rate)
+        markers = clip_markers(puppet, motion, times)
+        if before is not None:
+            markers = continued(puppet, markers, before)
+        notes += _turned_notes(puppet, markers, reference, times)
+        own = ground_poses(
+            retarget(puppet, rest, markers, reference, keep=direction.keep), markers, rest, reference, scale
+        )
+        way = horizontal_path(markers[:, root], reference[root], scale, direction.travel)
+        if before is not None:
+            count = round(direction.between * rate)
+            way = way - way[0] + ways[-1][-1]
+            poses.append(_between(puppet, poses[-1][-1], own[0], count)[1:])
+            ways.append(np.repeat(way[:1], len(poses[-1]), axis=0))
+        poses.append(own)
+        ways.append(way)
+        before = markers
+    return np.concatenate(poses), np.concatenate(ways), rate, tuple(dict.fromkeys(notes))
+
+
+def _between(puppet: Puppet, first: Floats, second: Floats, count: int) -> Floats:
+    """``count`` poses and one from ``first`` up to, but without, ``second``."""
+    return np.concatenate([first[None], blend_poses(puppet.bones, first, second, ease(count))])
 
 
 def _turned_notes(puppet: Puppet, markers: Floats, reference: Floats, times: Floats) -> Iterator[str]:

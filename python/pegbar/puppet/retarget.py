@@ -14,13 +14,13 @@ from scipy.spatial.transform import Rotation
 
 from pegbar import arrays
 from pegbar.errors import DegenerateError
-from pegbar.puppet.drawn_pose import moved_bones
+from pegbar.puppet.drawn_pose import LIMB_ENDS, moved_bones
 from pegbar.scene.gait import facing
 from pegbar.scene.puppet import Puppet
 
 Floats = NDArray[np.float64]
-# The outer joints of arms and legs; what ends elsewhere is the body, whose build is the drawing's.
-_LIMB_ENDS = ("elbow", "hand", "wrist", "knee", "foot", "toe")
+
+
 # Degrees by which a limb may be drawn otherwise than in the clip and still be the same pose, and from which on it is
 # another one: a drawing with stretched-out arms does not walk with stretched-out arms.
 _SAME, _OTHER = 30.0, 75.0
@@ -60,7 +60,7 @@ def retarget(
     moved = moved_bones(puppet)
     before = arrays.floats("reference", reference, (joints, 3), allow="nan")
     _refuse_missing(puppet, clip, moved)
-    turns = Rotation.from_euler("y", facing_turn(puppet, clip, before), degrees=True)
+    turns = Rotation.from_euler("y", facing_turn(puppet, clip, before)[:, None], degrees=True)
     result = np.zeros(clip.shape)
     root = int(np.flatnonzero(puppet.parents < 0)[0])
     result[:, root] = rest[root]
@@ -106,7 +106,7 @@ def facing_turn(puppet: Puppet, clip: Floats, reference: Floats) -> Floats:
 
 def _kept(offset: Rotation, keep: str, marker: str) -> Rotation:
     """The part of ``offset`` that stays."""
-    if keep == "always" or not marker.endswith(_LIMB_ENDS):
+    if keep == "always" or not marker.endswith(LIMB_ENDS):
         return offset
     if keep == "never":
         return Rotation.identity()

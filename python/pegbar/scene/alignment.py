@@ -21,7 +21,8 @@ class Alignment:
     drawn places, guessed where ``estimated`` (F, N): the drawing hides them. ``positions`` (F, N, 3) are the
     drawing's markers in world metres, which project exactly onto ``markers``; ``grounded`` (F, N) tells those whose
     depth is from the ground. ``errors`` (F,) are RMS distances between clip and seen marks in pixels, ``notes``
-    what was found or assumed and ``warnings`` what looks wrong, in words; ``clip_path`` is the clip's file, and ``swapped`` says that left and right marks are exchanged.
+    what was found or assumed and ``warnings`` what looks wrong, in words; ``clip_path`` is the clip's file, and
+    ``swapped`` says that left and right marks are exchanged.
     """
 
     names: tuple[str, ...]

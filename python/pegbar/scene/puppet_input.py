@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from pegbar.scene.drawing import Limb
+
 
 @dataclass(frozen=True, eq=False)
 class PuppetInput:
@@ -17,7 +19,10 @@ class PuppetInput:
     ``names`` are its J joints, ``marks`` (J, 2) their pixels (NaN where a joint is not marked) and ``visible`` (J,)
     whether they are seen. ``bones`` (B, 2) int are pairs of joints, parent and child, from the root outwards.
     ``drives`` is joint -> the clip's marker that moves it. ``source`` is what to call the picture in messages,
-    ``photo`` whether its silhouette has soft edges, ``notes`` what a user should know.
+    ``photo`` whether its silhouette has soft edges, ``notes`` what a user should know. ``segmentation`` (H, W, 3) uint8
+    is painted in the colours of ``limbs`` where the drawing comes with one. ``alpha`` (H, W) float32 is the figure's
+    coverage, 0 to 1, where it is known better than from picture and mask; ``bone_map`` (H, W) uint8 the bone that each
+    pixel belongs to, v + 1 for bone v, and ``radii`` (B,) the bones' half widths in pixels, once they are found.
     """
 
     image: NDArray[np.uint8]
@@ -30,6 +35,11 @@ class PuppetInput:
     source: str = "picture"
     photo: bool = False
     notes: tuple[str, ...] = ()
+    segmentation: NDArray[np.uint8] | None = None
+    limbs: tuple[Limb, ...] = ()
+    alpha: NDArray[np.float32] | None = None
+    bone_map: NDArray[np.uint8] | None = None
+    radii: NDArray[np.float64] | None = None
 
     @property
     def image_size(self) -> tuple[int, int]:

@@ -33,7 +33,7 @@ from pegbar.shot.plan import Shot
 from pegbar.shot.record import fingerprint, is_up_to_date, write_record
 from pegbar.shot.registered import CameraOptions, Retiming
 
-VERSION = 3
+VERSION = 4
 _SHEET = 24
 
 

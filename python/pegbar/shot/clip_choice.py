@@ -60,7 +60,7 @@ def choose_clip(
     else:
         path = folder / section.path
         motion = read_clip(section, folder, path)
-        part = Clip.from_motion(path.name, _named_part(motion, section))
+        part = _searched(path.name, _named_part(motion, section))
         found = _search(drawing, [part], holds, frame_rate)
         if section.azimuth is None or section.elevation is None:
             view = _view(_best(found, path.name), section.start)
@@ -82,11 +82,25 @@ def read_clip(section: ClipSection, folder: Path, path: Path) -> Motion:
     )
 
 
-def _named_part(motion: Motion, section: ClipSection) -> Motion:
+def _searched(name: str, motion: Motion) -> Clip:
+    try:
+        return Clip.from_motion(name, motion)
+    except ValueError as error:
+        raise ValueError(
+            f"clip: {name}: {error}, without which it cannot be compared; clip.joints can name it"
+        ) from None
+
+
+def check_part(motion: Motion, section: ClipSection) -> None:
+    """Raise ValueError where ``section`` names frames that the clip does not have."""
     frames = len(motion.positions)
     for key, value, most in (("start", section.start, frames - 1), ("stop", section.stop, frames)):
         if value is not None and value > most:
             raise ValueError(f"clip.{key}: the clip has {frames} frames, from 0 to {frames - 1}; got {value}")
+
+
+def _named_part(motion: Motion, section: ClipSection) -> Motion:
+    check_part(motion, section)
     return motion.slice(section.start, section.stop)
 
 

@@ -1,0 +1,39 @@
+"""`pegbar report`: one page with what every stage of a shot has found."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from pegbar.io import atomic
+from pegbar.report.page import html_page
+from pegbar.shot.plan import open_shot
+from pegbar.shot.shot_report import report_sections
+
+
+def report(
+    shot: Path,
+    *,
+    output: Annotated[
+        Path | None, Parameter(name=("--output", "-o"), help="The page (default: report.html beside the shot file).")
+    ] = None,
+) -> int:
+    """Write one page of all that a shot's stages have left; see `pegbar report --help`.
+
+    Parameters
+    ----------
+    shot
+        The shot file.
+    """
+    found = open_shot(shot, aligned=False)
+    sections = report_sections(found)
+    page = output or found.folder / "report.html"
+    name = found.settings.shot.name or shot.stem
+    lead = f"What pegbar has found and made for {shot.name}. Stages that have not run are left out."
+    page.parent.mkdir(parents=True, exist_ok=True)
+    atomic.write_bytes(page, html_page(name, lead, sections).encode())
+    print(f"report: {', '.join(section.title for section in sections)}, in {os.path.relpath(page)}")
+    return 0

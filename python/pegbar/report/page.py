@@ -1,0 +1,94 @@
+"""Pages that people open in a browser, offline: words, tables and pictures in one HTML file."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+
+#: Media types of what a page may hold, by suffix.
+MEDIA = {
+    ".png": "image/png",
+    ".apng": "image/apng",
+    ".gif": "image/gif",
+    ".webp": "image/webp",
+    ".jpg": "image/jpeg",
+    ".mp4": "video/mp4",
+    ".webm": "video/webm",
+}
+_STYLE = """
+:root { color-scheme: light dark; --line: #8884; --warn: #b45309; }
+body { font: 16px/1.5 system-ui, sans-serif; margin: 0 auto; max-width: 1100px; padding: 1.5rem; }
+h1 { margin-bottom: .2rem; } h2 { border-top: 1px solid var(--line); margin-top: 2.5rem; padding-top: 1rem; }
+table { border-collapse: collapse; margin: 1rem 0; }
+td { border-bottom: 1px solid var(--line); padding: .25rem 1rem .25rem 0; }
+td + td { font-variant-numeric: tabular-nums; }
+figure { display: inline-block; margin: .5rem 1rem .5rem 0; max-width: 100%; vertical-align: top; }
+img, video { background: #fff; border: 1px solid var(--line); max-width: 100%; }
+figcaption { font-size: .85rem; opacity: .8; } .warning { color: var(--warn); }
+""".strip()
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture, an animation or a video: ``source`` is a path relative to the page, or a data address."""
+
+    source: str
+    caption: str
+
+    @property
+    def is_video(self) -> bool:
+        """Whether a player is needed."""
+        return self.source.startswith("data:video/") or self.source.lower().endswith((".mp4", ".webm"))
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of a page: a title, then words, warnings, a table of names and values, files to open, pictures."""
+
+    title: str
+    words: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    table: tuple[tuple[str, str], ...] = ()
+    files: tuple[tuple[str, str], ...] = ()
+    pictures: tuple[Picture, ...] = ()
+
+
+def html_page(title: str, words: str, sections: Sequence[Section]) -> str:
+    """Return a whole HTML page that needs nothing else but the files that its pictures name."""
+    body = "\n".join(_section(section) for section in sections)
+    return (
+        f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{escape(title)}</title>\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n<link rel="icon" href="data:,">\n'
+        f"<style>\n{_STYLE}\n</style>\n</head>\n<body>\n<h1>{escape(title)}</h1>\n<p>{escape(words)}</p>\n"
+        f"{body}\n</body>\n</html>\n"
+    )
+
+
+def data_address(data: bytes, suffix: str) -> str:
+    """Return ``data`` of a kind told by ``suffix`` (one of `MEDIA`) as an address that holds it."""
+    return f"data:{MEDIA[suffix.lower()]};base64,{base64.b64encode(data).decode('ascii')}"
+
+
+def _section(section: Section) -> str:
+    parts = [f"<section>\n<h2>{escape(section.title)}</h2>"]
+    parts += [f"<p>{escape(word)}</p>" for word in section.words]
+    parts += [f'<p class="warning">{escape(warning)}</p>' for warning in section.warnings]
+    if section.table:
+        rows = (f"<tr><td>{escape(name)}</td><td>{escape(value)}</td></tr>" for name, value in section.table)
+        parts.append(f"<table>\n{chr(10).join(rows)}\n</table>")
+    if section.files:
+        rows = (f'<li><a href="{escape(path)}">{escape(path)}</a> {escape(what)}</li>' for path, what in section.files)
+        parts.append(f"<ul>\n{chr(10).join(rows)}\n</ul>")
+    parts += [_picture(picture) for picture in section.pictures]
+    return "\n".join([*parts, "</section>"])
+
+
+def _picture(picture: Picture) -> str:
+    caption = escape(picture.caption)
+    if picture.is_video:
+        shown = f'<video src="{escape(picture.source)}" controls loop muted></video>'
+    else:
+        shown = f'<img src="{escape(picture.source)}" alt="{caption}">'
+    return f"<figure>{shown}<figcaption>{caption}</figcaption></figure>"
