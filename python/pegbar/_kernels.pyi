@@ -4,10 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
-    "capsule_distances",
-    "Deformer",
     "SOURCES",
+    "Deformer",
     "average_triangles",
+    "capsule_distances",
     "composite_matte",
     "constrained_delaunay",
     "convert_srgb",
