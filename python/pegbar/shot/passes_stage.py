@@ -21,7 +21,8 @@ from pegbar.shot.drawn import Drawn, drawn_inputs, read_drawn
 from pegbar.shot.model import SecondarySection
 from pegbar.shot.plan import Shot
 from pegbar.shot.stages import Stage, check_passes, write_final
-from pegbar.simulate.layers import exr_channels, render_shadow, under
+from pegbar.shot.view import LIGHT, View, lay_under, part_of, seen_window
+from pegbar.simulate.layers import render_shadow
 from pegbar.simulate.meshes import Models, volume_meshes
 from pegbar.simulate.passes import Ink, Passes, render_passes
 from pegbar.simulate.scene import SimulationScene
@@ -76,28 +77,31 @@ class ElementsStage(Stage):
         return [*found, *layers.characters]
 
     def make(self, frame: int) -> tuple[str, ...]:
-        passes, shadow = self.render(frame)
+        view = self.render(frame)
         final, *exr = self.outputs(frame)
-        picture, notes = self._composite(frame, passes)
+        picture, notes = self._composite(frame, view.whole())
         write_final(final, picture)
         if exr:
-            small = passes.resolved()
-            channels = exr_channels(small, None if shadow is None else shadow.resolved())
-            write_exr(exr[0], channels, window=_filled_window(small))
+            write_exr(exr[0], view.channels(), window=view.window)
         return notes
 
-    def render(self, frame: int) -> tuple[Passes, Passes | None]:
-        """Return the passes of ``frame`` with the shadow in them, and the shadow alone."""
+    def render(self, frame: int) -> View:
+        """Return what is seen of the elements in ``frame`` and of their and the characters' shadows."""
         layers = self.layers
-        index, samples = frame - layers.first, layers.section.samples
+        index, samples, ground = frame - layers.first, layers.section.samples, layers.scene.ground
         camera, meshes = layers.scene.cameras[index], self.models.meshes(layers.cache, index)
-        ink = Ink(INK.width * camera.image_size[0] / 960, INK.color, INK.crease_angle)
-        passes = render_passes(meshes, camera, samples=samples, bands=BANDS, ink=ink)
-        if not layers.section.shadow or layers.scene.ground is None:
-            return passes, None
-        casting = [*meshes, *volume_meshes(layers.scene, index)]
-        shadow = render_shadow(casting, camera, layers.scene.ground, samples=samples)
-        return under(passes, shadow), shadow
+        pen = INK.width * camera.image_size[0] / 960
+        casting = [*meshes, *volume_meshes(layers.scene, index)] if layers.section.shadow and ground is not None else []
+        window = seen_window(camera, meshes, casting, ground or 0.0, pen)
+        part = part_of(camera, window)
+        passes = render_passes(
+            meshes, part, samples=samples, light=LIGHT, bands=BANDS, ink=Ink(pen, INK.color, INK.crease_angle)
+        )
+        shadow = None
+        if casting and ground is not None:
+            shadow = render_shadow(casting, part, ground, samples=samples, light=LIGHT)
+            lay_under(passes, shadow)
+        return View(camera.image_size, window, passes, shadow)
 
     def _composite(self, frame: int, passes: Passes) -> tuple[NDArray[Any], tuple[str, ...]]:
         """Put one character after the other into what is rendered, the shot's own first."""
@@ -144,12 +148,3 @@ def _nearest(rendered: Floats, drawn: Drawn, drawn_depth: Floats) -> Floats:
     blocks = rendered.reshape(height, rendered.shape[0] // height, width, rendered.shape[1] // width)
     nearest: Floats = np.minimum(blocks.min(axis=(1, 3)), np.where(drawn.alpha > 0, drawn_depth, np.inf))
     return nearest
-
-
-def _filled_window(passes: Passes) -> tuple[int, int, int, int]:
-    """First and last column and row of what is rendered; one pixel where nothing is."""
-    filled = np.isfinite(passes.depth) | (passes.beauty[..., 3] > 0)
-    rows, columns = np.flatnonzero(filled.any(axis=1)), np.flatnonzero(filled.any(axis=0))
-    if not len(rows):
-        return 0, 0, 0, 0
-    return int(columns[0]), int(rows[0]), int(columns[-1]), int(rows[-1])
