@@ -72,6 +72,15 @@ Aligns the shot first where that is out of date. Writes a skeleton posed as draw
 or your rig's), the frame rate, loops, standing feet, held joints, and limbs whose depth is to be turned.
 
 Example: pegbar lift my_shot/shot.toml""",
+    "secondary": """Add cloth and balls that collide with the drawn character: secondary motion, to finished frames.
+
+Aligns the shot where that is needed and out of date, finds limb boxes and collision volumes, simulates what the shot
+file's [secondary] section names, renders it, and composites it with the drawings in depth order. Only what is out of
+date is done again. Leaves passes, finished frames, an animation, a contact sheet and a report.
+
+Example: pegbar secondary my_shot/shot.toml
+
+Example: pegbar secondary my_shot/shot.toml --frames 1-24""",
     "animate": """Let a drawn or photographed figure perform a motion capture clip.
 
 Joints are found beside the picture: AnimatedDrawings' char_cfg.yaml, our annotations or COCO keypoints; a mask as well.
