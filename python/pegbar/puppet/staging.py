@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
+import os
+from collections import deque
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import cv2
@@ -18,6 +22,8 @@ Floats = NDArray[np.float64]
 Pixels = NDArray[np.uint8]
 #: What is behind the figures.
 BACKGROUNDS = ("plain", "transparent", "completed", "picture")
+# Pictures drawn at the same time, and ahead of the one that is asked for.
+_THREADS, _AHEAD = max(1, min(8, os.cpu_count() or 1)), 16
 # Part of the canvas that stays free on each side where figures are fitted into it.
 _MARGIN = 0.04
 # Part of a figure's width between two figures side by side.
@@ -107,21 +113,35 @@ class Stage:
 
         A figure whose clip is shorter than another's begins again.
         """
-        figures = [FigurePicture.of_puppet(performance.puppet) for performance in self.performances]
-        for frame in range(start, len(self) if stop is None else stop):
-            ground = self._ground(frame)
-            canvas: Pixels | None = None
-            for index, performance in enumerate(self.performances):
-                own = frame % len(performance)
-                mesh = performance.meshes[own] * self.scales[index] + self.offsets[index]
-                drawn = figures[index].draw(mesh, performance.triangle_depths(own), self.size)
-                if ground is not None:
-                    ground = _kernels.over_ground(drawn, ground)
-                else:
-                    canvas = drawn if canvas is None else put_over(drawn, canvas)
-            finished = ground if ground is not None else canvas
-            assert finished is not None
-            yield finished
+        figures = [
+            FigurePicture.of_puppet(performance.puppet, scale)
+            for performance, scale in zip(self.performances, self.scales, strict=True)
+        ]
+        frames = iter(range(start, len(self) if stop is None else stop))
+        with ThreadPoolExecutor(_THREADS) as pool:
+            ahead = deque(pool.submit(self._picture, figures, frame) for frame in itertools.islice(frames, _AHEAD))
+            try:
+                while ahead:
+                    finished = ahead.popleft().result()
+                    ahead.extend(pool.submit(self._picture, figures, frame) for frame in itertools.islice(frames, 1))
+                    yield finished
+            finally:
+                pool.shutdown(cancel_futures=True)
+
+    def _picture(self, figures: Sequence[FigurePicture], frame: int) -> Pixels:
+        ground = self._ground(frame)
+        canvas: Pixels | None = None
+        for index, performance in enumerate(self.performances):
+            own = frame % len(performance)
+            mesh = performance.meshes[own] * self.scales[index] + self.offsets[index]
+            drawn = figures[index].draw(mesh, performance.triangle_depths(own), self.size)
+            if ground is not None:
+                ground = _kernels.over_ground(drawn, ground)
+            else:
+                canvas = drawn if canvas is None else put_over(drawn, canvas)
+        finished = ground if ground is not None else canvas
+        assert finished is not None
+        return finished
 
     def _ground(self, frame: int) -> Pixels | None:
         """What is behind the figures (H, W, 3), one pixel (1, 1, 3) for one colour, or None for nothing."""
@@ -136,7 +156,11 @@ class Stage:
         smooth = cv2.INTER_LINEAR if scale >= 1 else cv2.INTER_AREA
         if not shift.any() and scale < 1 and np.allclose(np.array(self.behind.shape[1::-1]) * scale, self.size, atol=1):
             return np.asarray(cv2.resize(self.behind, self.size, interpolation=smooth), np.uint8)
-        warped = cv2.warpAffine(self.behind, move, self.size, flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        # A camera that follows leaves the picture: its rim goes on. One that stands still shows what it has.
+        rim = cv2.BORDER_REPLICATE if first.shift.any() else cv2.BORDER_CONSTANT
+        warped = cv2.warpAffine(
+            self.behind, move, self.size, flags=cv2.INTER_LINEAR, borderMode=rim, borderValue=self.setting.color
+        )
         return np.asarray(warped, np.uint8)
 
 
