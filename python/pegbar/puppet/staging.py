@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
-import os
-from collections import deque
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import cv2
@@ -14,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pegbar import _kernels
+from pegbar.ahead import map_ahead
 from pegbar.puppet.drawn_pose import focal_lengths
 from pegbar.puppet.figure_picture import FigurePicture
 from pegbar.puppet.performance import Performance
@@ -22,8 +19,6 @@ Floats = NDArray[np.float64]
 Pixels = NDArray[np.uint8]
 #: What is behind the figures.
 BACKGROUNDS = ("plain", "transparent", "completed", "picture")
-# Pictures drawn at the same time, and ahead of the one that is asked for.
-_THREADS, _AHEAD = max(1, min(8, os.cpu_count() or 1)), 16
 # Part of the canvas that stays free on each side where figures are fitted into it.
 _MARGIN = 0.04
 # Part of a figure's width between two figures side by side.
@@ -117,16 +112,8 @@ class Stage:
             FigurePicture.of_puppet(performance.puppet, scale)
             for performance, scale in zip(self.performances, self.scales, strict=True)
         ]
-        frames = iter(range(start, len(self) if stop is None else stop))
-        with ThreadPoolExecutor(_THREADS) as pool:
-            ahead = deque(pool.submit(self._picture, figures, frame) for frame in itertools.islice(frames, _AHEAD))
-            try:
-                while ahead:
-                    finished = ahead.popleft().result()
-                    ahead.extend(pool.submit(self._picture, figures, frame) for frame in itertools.islice(frames, 1))
-                    yield finished
-            finally:
-                pool.shutdown(cancel_futures=True)
+        frames = range(start, len(self) if stop is None else stop)
+        return map_ahead(lambda frame: self._picture(figures, frame), frames)
 
     def _picture(self, figures: Sequence[FigurePicture], frame: int) -> Pixels:
         ground = self._ground(frame)
