@@ -3,8 +3,10 @@
 pub mod amc;
 pub mod band;
 pub mod bvh;
+pub mod capsule;
 pub mod checks;
 pub mod clip;
+pub mod cloth;
 pub mod color;
 pub mod composite;
 pub mod composite_block;

@@ -93,3 +93,14 @@ def test_nearest_points_are_the_nearest(numbers):
     b = other + shares[:, None] * (last - other)
     least = np.linalg.norm(a[:, None] - b[None], axis=2).min()
     assert distance <= least + 1e-6
+
+
+@pytest.mark.parametrize(("layers", "ranks"), [((0, 0, 1), [1, 0]), ((1, 1, 0), [0, 1])])
+def test_where_a_limb_hangs_on_another_layer_the_order_stays_as_drawn(layers, ranks):
+    bones = np.array([[0, 1], [1, 2], [2, 3]])
+    poses = np.zeros((2, 4, 3))
+    poses[:, :, :2] = [[0, 1], [0, 0.6], [0.1, 0.3], [0.1, 0]]
+    poses[:, 2:, 2] = np.array([[0.5], [-0.5]])
+    coat_and_thigh = Pieces(np.arange(2), np.array([1, 2]), np.array(layers)[1:], np.full(2, 50.0))
+    found = piece_ranks(coat_and_thigh, bones, camera(), poses)
+    assert found.tolist() == [ranks, ranks]

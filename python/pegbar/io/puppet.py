@@ -56,7 +56,12 @@ def read_puppet(path: _Path) -> Puppet:
 
 def write_figure(path: _Path, figure: PuppetInput) -> None:
     """Write a prepared figure as a .npz file, without its picture, complete or not at all."""
-    words: dict[str, Any] = {"kind": _FIGURE, "names": figure.names, "drives": dict(figure.drives)}
+    words: dict[str, Any] = {
+        "kind": _FIGURE,
+        "names": figure.names,
+        "drives": dict(figure.drives),
+        "photo": figure.photo,
+    }
     words |= {"notes": figure.notes, "limbs": [[limb.name, limb.start, limb.end, limb.color] for limb in figure.limbs]}
     arrays = _arrays(figure)
     del arrays["image"]

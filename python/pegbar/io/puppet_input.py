@@ -98,6 +98,7 @@ def read_puppet_input(
         bones=skeleton.bones,
         drives=skeleton.drives,
         source=str(given),
+        photo=given.suffix.lower() in (".jpg", ".jpeg") and silhouette is None,
         notes=skeleton.notes,
         segmentation=_segmentation(drawing, place, image),
         limbs=tuple(limb for limb in drawing.limbs if limb.color is not None),

@@ -21,7 +21,7 @@ Matting = Literal["auto", "closed form", "guided", "mask"]
 #: How far on both sides of a silhouette coverage is open, as part of the figure's size, and at least in pixels.
 BAND, LEAST_BAND = 0.004, 3.0
 #: How far the guided filter looks around a pixel, in bands, and what it takes for flat (squared, of 0 to 1).
-_LOOK, _FLAT = 2.0, 1e-4
+_LOOK, _FLAT = 2.0, 5e-3
 
 
 def figure_alpha(image: Pixels, mask: Flags, method: Matting = "auto") -> Coverage:

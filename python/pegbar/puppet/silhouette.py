@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pegbar.errors import DegenerateError
 from pegbar.puppet.parts import bone_distances
 from pegbar.puppet.template import covered, fit_template, person_template
-from pegbar.puppet.view import View
+from pegbar.puppet.view import View, drawn_view
 from pegbar.scene.puppet_input import PuppetInput
 
 Floats = NDArray[np.float64]
@@ -25,8 +25,6 @@ _SURE = 0.4
 #: How far beyond the template's outline the figure may reach, in lengths of the trunk: hair, clothes, shoes.
 _REACH = 0.16
 _ROUNDS = 6
-#: Shoulders that are farther apart than these parts of the trunk's length are seen from the front, or in half profile.
-_FRONT, _HALF = 0.45, 0.25
 #: Paper: how much its brightness usually varies along the picture's border, beside a smooth change of light.
 _PAPER_SPREAD = 4.5
 
@@ -84,7 +82,7 @@ def person_mask(source: PuppetInput, view: View | None = None) -> Flags:
     """
     trunk = float(np.linalg.norm(source.marks[source.names.index("neck")] - source.marks[source.names.index("pelvis")]))
     try:
-        template = person_template(view or _view(source, trunk))
+        template = person_template(view or drawn_view(source))
         shape = fit_template(template, source.names, source.marks)
     except (ValueError, DegenerateError) as error:
         raise ValueError(
@@ -108,15 +106,6 @@ def person_mask(source: PuppetInput, view: View | None = None) -> Flags:
     mask = np.zeros(seeds.shape, bool)
     mask[window] = np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD))
     return _tidied(mask, source, trunk)
-
-
-def _view(source: PuppetInput, trunk: float) -> View:
-    """The view that the shoulders' and hips' distances tell, beside the length of the trunk."""
-    places = dict(zip(source.names, source.marks, strict=True))
-    pairs = [(f"left_{joint}", f"right_{joint}") for joint in ("shoulder", "hip")]
-    wide = [float(np.linalg.norm(places[a] - places[b])) / trunk for a, b in pairs if a in places and b in places]
-    wide = wide or [1.0]
-    return "front" if max(wide) > _FRONT else "half profile" if max(wide) > _HALF else "side"
 
 
 def _seeds(source: PuppetInput, likely: Flags, trunk: float) -> Labels:
