@@ -109,7 +109,7 @@ class Stage:
         A figure whose clip is shorter than another's begins again.
         """
         figures = [
-            FigurePicture.of_puppet(performance.puppet, scale)
+            FigurePicture.of_puppet(performance.puppet, scale * _growth(performance))
             for performance, scale in zip(self.performances, self.scales, strict=True)
         ]
         frames = range(start, len(self) if stop is None else stop)
@@ -165,6 +165,12 @@ def put_over(drawn: Pixels, ground: Pixels) -> Pixels:
     lower[..., :3] = (mixed + total // 2) // np.maximum(total, 1)
     lower[..., 3:] = total
     return ground
+
+
+def _growth(performance: Performance) -> float:
+    """How much larger than drawn a figure becomes that comes nearer, 1 or more."""
+    heights = np.ptp(performance.meshes[..., 1], axis=1)
+    return max(1.0, float(heights.max() / max(np.ptp(performance.puppet.vertices[:, 1]), 1e-9)))
 
 
 def _behind(performance: Performance, setting: Setting, picture: Pixels | None) -> Pixels | None:
