@@ -101,6 +101,6 @@ def test_where_a_limb_hangs_on_another_layer_the_order_stays_as_drawn(layers, ra
     poses = np.zeros((2, 4, 3))
     poses[:, :, :2] = [[0, 1], [0, 0.6], [0.1, 0.3], [0.1, 0]]
     poses[:, 2:, 2] = np.array([[0.5], [-0.5]])
-    coat_and_thigh = Pieces(np.arange(2), np.array([1, 2]), np.array(layers)[1:], np.full(2, 50.0))
+    coat_and_thigh = Pieces(np.arange(2), np.array([1, 2]), np.array(layers)[1:], np.full(2, 50.0), np.zeros(2, int))
     found = piece_ranks(coat_and_thigh, bones, camera(), poses)
     assert found.tolist() == [ranks, ranks]

@@ -116,26 +116,28 @@ class Stage:
         return map_ahead(lambda frame: self._picture(figures, frame), frames)
 
     def _picture(self, figures: Sequence[FigurePicture], frame: int) -> Pixels:
-        ground = self._ground(frame)
-        canvas: Pixels | None = None
+        canvas = self._ground(frame)
         for index, performance in enumerate(self.performances):
             own = frame % len(performance)
             mesh = performance.meshes[own] * self.scales[index] + self.offsets[index]
-            drawn = figures[index].draw(mesh, performance.triangle_depths(own), self.size)
-            if ground is not None:
-                ground = _kernels.over_ground(drawn, ground)
-            else:
-                canvas = drawn if canvas is None else put_over(drawn, canvas)
-        finished = ground if ground is not None else canvas
-        assert finished is not None
-        return finished
+            # Only the part of the canvas that the figure is on: a whole number of pixels from the corner.
+            low = np.clip(np.floor(mesh.min(axis=0)).astype(int) - 1, 0, self.size)
+            high = np.clip(np.ceil(mesh.max(axis=0)).astype(int) + 2, 0, self.size)
+            width, height = (high - low).tolist()
+            if width < 1 or height < 1:
+                continue
+            drawn = figures[index].draw(mesh - low, performance.triangle_depths(own), (width, height))
+            part = canvas[low[1] : high[1], low[0] : high[0]]
+            part[...] = put_over(drawn, part) if self.setting.background == "transparent" else over(drawn, part)
+        return canvas
 
-    def _ground(self, frame: int) -> Pixels | None:
-        """What is behind the figures (H, W, 3), one pixel (1, 1, 3) for one colour, or None for nothing."""
+    def _ground(self, frame: int) -> Pixels:
+        """What is behind the figures: (H, W, 3), or (H, W, 4) and empty."""
+        width, height = self.size
         if self.setting.background == "transparent":
-            return None
+            return np.zeros((height, width, 4), np.uint8)
         if self.behind is None:
-            return np.array([[self.setting.color]], np.uint8)
+            return np.tile(np.array(self.setting.color, np.uint8), (height, width, 1))
         first = self.performances[0]
         scale, shift = self.scales[0], first.shift[frame % len(first)]
         move = np.array([[scale, 0, 0], [0, scale, 0]])
@@ -151,20 +153,21 @@ class Stage:
         return np.asarray(warped, np.uint8)
 
 
+def over(drawn: Pixels, ground: Pixels) -> Pixels:
+    """Return ``drawn`` (H, W, 4), straight alpha, over ``ground`` (H, W, 3)."""
+    return _kernels.over_ground(drawn, np.ascontiguousarray(ground))
+
+
 def put_over(drawn: Pixels, ground: Pixels) -> Pixels:
-    """Put ``drawn`` (H, W, 4) over ``ground`` (H, W, 4), both with straight alpha, in place."""
-    rows, columns = np.flatnonzero(drawn[..., 3].any(axis=1)), np.flatnonzero(drawn[..., 3].any(axis=0))
-    if not len(rows):
-        return ground
-    part = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    upper, lower = drawn[part], ground[part]
-    alpha = upper[..., 3:].astype(np.uint16)
-    under = lower[..., 3:].astype(np.uint16) * (255 - alpha) // 255
+    """Return ``drawn`` over ``ground``, both (H, W, 4) with straight alpha."""
+    if not ground[..., 3].any():
+        return drawn
+    alpha = drawn[..., 3:].astype(np.uint16)
+    under = ground[..., 3:].astype(np.uint16) * (255 - alpha) // 255
     total = alpha + under
-    mixed = upper[..., :3].astype(np.uint32) * alpha + lower[..., :3].astype(np.uint32) * under
-    lower[..., :3] = (mixed + total // 2) // np.maximum(total, 1)
-    lower[..., 3:] = total
-    return ground
+    mixed = drawn[..., :3].astype(np.uint32) * alpha + ground[..., :3].astype(np.uint32) * under
+    colors = (mixed + total // 2) // np.maximum(total, 1)
+    return np.asarray(np.concatenate([colors, total], axis=2), np.uint8)
 
 
 def _growth(performance: Performance) -> float:
