@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -133,23 +134,31 @@ class Stage:
 
     def _ground(self, frame: int) -> Pixels:
         """What is behind the figures: (H, W, 3), or (H, W, 4) and empty."""
-        width, height = self.size
-        if self.setting.background == "transparent":
-            return np.zeros((height, width, 4), np.uint8)
-        if self.behind is None:
-            return np.tile(np.array(self.setting.color, np.uint8), (height, width, 1))
         first = self.performances[0]
-        scale, shift = self.scales[0], first.shift[frame % len(first)]
+        shift = first.shift[frame % len(first)]
+        if self.setting.background == "transparent":
+            return np.zeros((self.size[1], self.size[0], 4), np.uint8)
+        if self.behind is None or not shift.any():
+            return self._still.copy()
+        # A camera that follows leaves the picture: its rim goes on.
+        return self._seen(self.behind, shift, cv2.BORDER_REPLICATE)
+
+    @cached_property
+    def _still(self) -> Pixels:
+        """What is behind the figures where the camera stands still."""
+        if self.behind is None:
+            return np.asarray(np.full((self.size[1], self.size[0], 3), self.setting.color, np.uint8))
+        whole = np.array(self.behind.shape[1::-1]) * self.scales[0]
+        if self.scales[0] < 1 and np.allclose(whole, self.size, atol=1):
+            return np.asarray(cv2.resize(self.behind, self.size, interpolation=cv2.INTER_AREA), np.uint8)
+        return self._seen(self.behind, np.zeros(2), cv2.BORDER_CONSTANT)
+
+    def _seen(self, picture: Pixels, shift: Floats, rim: int) -> Pixels:
+        scale = self.scales[0]
         move = np.array([[scale, 0, 0], [0, scale, 0]])
         move[:, 2] = self.offsets[0] + scale * shift
-        smooth = cv2.INTER_LINEAR if scale >= 1 else cv2.INTER_AREA
-        if not shift.any() and scale < 1 and np.allclose(np.array(self.behind.shape[1::-1]) * scale, self.size, atol=1):
-            return np.asarray(cv2.resize(self.behind, self.size, interpolation=smooth), np.uint8)
-        # A camera that follows leaves the picture: its rim goes on. One that stands still shows what it has.
-        rim = cv2.BORDER_REPLICATE if first.shift.any() else cv2.BORDER_CONSTANT
-        warped = cv2.warpAffine(
-            self.behind, move, self.size, flags=cv2.INTER_LINEAR, borderMode=rim, borderValue=self.setting.color
-        )
+        color = self.setting.color
+        warped = cv2.warpAffine(picture, move, self.size, flags=cv2.INTER_LINEAR, borderMode=rim, borderValue=color)
         return np.asarray(warped, np.uint8)
 
 
