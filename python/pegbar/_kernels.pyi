@@ -4,9 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
-    "Deformer",
     "SOURCES",
+    "Deformer",
     "average_triangles",
+    "capsule_distances",
     "composite_matte",
     "constrained_delaunay",
     "convert_srgb",
@@ -26,8 +27,8 @@ __all__ = [
     "limb_depth",
     "limb_depths",
     "matte",
-    "own_alpha",
     "over_ground",
+    "own_alpha",
     "pack_gif_frames",
     "palette_labels",
     "parse_amc",
@@ -40,6 +41,7 @@ __all__ = [
     "search_clips",
     "segment_path",
     "segment_stick_figure",
+    "step_cloth",
     "stroke_polyline",
     "time_warp",
     "unpremultiply",
@@ -49,6 +51,7 @@ SOURCES: str
 
 _Floats = NDArray[np.float32]
 _Doubles = NDArray[np.float64]
+_Indices = NDArray[np.uint32]
 _Pictures = tuple[_Floats, _Floats, _Floats, NDArray[np.uint16]]
 
 def convert_srgb(pixels: NDArray[np.float32], encode: bool) -> NDArray[np.float32]: ...
@@ -182,3 +185,17 @@ def constrained_delaunay(
     points: _Doubles, edges: NDArray[np.uint32]
 ) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]: ...
 def inside_rings(places: _Doubles, rings: list[tuple[_Doubles, bool]]) -> NDArray[np.bool_]: ...
+def capsule_distances(points: _Doubles, capsules: _Doubles) -> tuple[_Doubles, NDArray[np.uint32]]: ...
+def step_cloth(
+    made: tuple[_Doubles, _Indices, _Indices, _Doubles, _Indices, _Doubles, _Indices, _Doubles, _Indices, _Doubles],
+    acting: tuple[
+        tuple[float, float],
+        tuple[float, tuple[float, float, float]],
+        tuple[float, float, float, float, float],
+        int,
+    ],
+    air: _Doubles,
+    pins: tuple[_Indices, _Doubles],
+    capsules: _Doubles,
+    state: tuple[_Doubles, _Doubles],
+) -> None: ...

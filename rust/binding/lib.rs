@@ -3,6 +3,7 @@
 mod amc;
 mod arrays;
 mod bvh;
+mod cloth;
 mod color;
 mod composite;
 mod deform;
@@ -41,6 +42,8 @@ mod _kernels {
     use crate::amc::parse_amc;
     #[pymodule_export]
     use crate::bvh::parse_bvh;
+    #[pymodule_export]
+    use crate::cloth::{capsule_distances, step_cloth};
     #[pymodule_export]
     use crate::color::convert_srgb;
     #[pymodule_export]

@@ -63,8 +63,8 @@ impl Deformer {
         let hinges = hinges(triangles, vertices.len());
         let loose = KernelError::Argument { argument: "handles", problem: "too few to say where all of the mesh goes" };
         let (like, joined) = rayon::join(
-            || System::new(vertices, &similar(vertices, triangles, &weighted, &hinges), &held),
-            || System::new(vertices, &stitched(triangles, &weighted), handles),
+            || System::new(vertices.len(), &similar(vertices, triangles, &weighted, &hinges), &held),
+            || System::new(vertices.len(), &stitched(triangles, &weighted), handles),
         );
         let (Some(intermediate), Some(stitching)) = (like, joined) else { return Err(loose) };
         let rest = triangles.iter().map(|corners| centred(corners.map(|corner| vertices[corner as usize])).0).collect();

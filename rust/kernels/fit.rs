@@ -32,6 +32,11 @@ pub fn centred(corners: [DVec2; 3]) -> ([DVec2; 3], DVec2) {
 #[inline(always)]
 pub fn rotation(shape: [DVec2; 3], target: [DVec2; 3]) -> DVec2 {
     let sum = (0..3).fold(DVec2::ZERO, |sum, k| sum + conjugate(shape[k]).rotate(target[k]));
+    let length = sum.length();
+    // Squares of very large or small numbers leave the range: then the numbers are scaled first.
+    if (1e-140..1e140).contains(&length) {
+        return sum / length;
+    }
     let scaled = sum / sum.abs().max_element();
     if scaled.is_finite() { scaled / scaled.length() } else { DVec2::X }
 }

@@ -73,7 +73,7 @@ impl<E: Entry> Upper<E> {
     pub fn new(size: usize, entries: impl Iterator<Item = (u32, u32, E)>) -> Self {
         let diagonal = (0..size as u32).map(|i| (i, i, E::ZERO));
         let mut all: Vec<(u32, u32, E)> = diagonal.chain(entries.filter(|(row, column, _)| row <= column)).collect();
-        all.sort_by_key(|(row, column, _)| (*column, *row));
+        all.sort_by_key(|(row, column, _)| u64::from(*column) << 32 | u64::from(*row));
         let (mut starts, mut rows, mut values) = (vec![0; size + 1], Vec::new(), Vec::<E>::new());
         let mut last = None;
         for (row, column, value) in all {

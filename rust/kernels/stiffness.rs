@@ -5,7 +5,7 @@
 //! opposite corner k at rest. Stitching: squared distance of each edge from its fitted one. All weights make errors
 //! relative to an edge's length at rest, so that a finely cut rim counts no more than the rest.
 
-use crate::dissect::{Neighbours, dissect};
+use crate::elimination::minimum_degree;
 use crate::fit::conjugate;
 use crate::hinge::Hinge;
 use crate::ldl::{Entry, Factor, Upper};
@@ -123,20 +123,19 @@ pub struct System<E> {
 }
 
 impl<E: Entry> System<E> {
-    /// From the entries over all vertices at `places`, of which `held` are given; None where they do not suffice.
-    pub fn new(places: &[DVec2], entries: &[Triplet<E>], held: &[u32]) -> Option<Self> {
-        let mut role = vec![Role::Free(0); places.len()];
+    /// From the entries over `count` vertices, of which `held` are given; None where they do not suffice.
+    pub fn new(count: usize, entries: &[Triplet<E>], held: &[u32]) -> Option<Self> {
+        let mut role = vec![Role::Free(0); count];
         held.iter().enumerate().for_each(|(index, vertex)| role[*vertex as usize] = Role::Held(index as u32));
-        let free: Vec<u32> = (0..places.len() as u32).filter(|v| matches!(role[*v as usize], Role::Free(_))).collect();
+        let free: Vec<u32> = (0..count as u32).filter(|v| matches!(role[*v as usize], Role::Free(_))).collect();
         free.iter().enumerate().for_each(|(index, vertex)| role[*vertex as usize] = Role::Free(index as u32));
         let pair = |(i, j, _): &Triplet<E>| match (role[*i as usize], role[*j as usize]) {
             (Role::Free(i), Role::Free(j)) if i < j => Some([i, j]),
             _ => None,
         };
-        let neighbours = Neighbours::new(free.len(), &entries.iter().filter_map(pair).collect::<Vec<_>>());
-        let free_places: Vec<DVec2> = free.iter().map(|vertex| places[*vertex as usize]).collect();
+        let pairs: Vec<[u32; 2]> = entries.iter().filter_map(pair).collect();
         let order: Vec<u32> =
-            dissect(&free_places, &neighbours).into_iter().map(|index| free[index as usize]).collect();
+            minimum_degree(free.len(), &pairs).into_iter().map(|index| free[index as usize]).collect();
         order.iter().enumerate().for_each(|(index, vertex)| role[*vertex as usize] = Role::Free(index as u32));
         let inner = entries.iter().filter_map(|(i, j, value)| match (role[*i as usize], role[*j as usize]) {
             (Role::Free(i), Role::Free(j)) => Some((i, j, *value)),

@@ -5,8 +5,8 @@
 
 use crate::error::{KernelError, check_length};
 use crate::scan::Outline;
-use crate::texels::{FULL, Texels, Texture, straight};
-use glam::{DVec2, Vec2, Vec4};
+use crate::texels::{FULL, LANES, Ramp, Texels, Texture, straight};
+use glam::{DVec2, IVec2};
 use multiversion::multiversion;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -43,12 +43,9 @@ pub struct Target<'a> {
 #[derive(Debug)]
 struct Piece {
     outline: Outline,
-    corner: DVec2,
-    place: DVec2,
-    along_x: DVec2,
-    along_y: DVec2,
-    low: Vec2,
-    high: Vec2,
+    ramp: Ramp,
+    low: IVec2,
+    high: IVec2,
 }
 
 impl Piece {
@@ -57,24 +54,28 @@ impl Piece {
         let [a, b, c] = corners;
         let (p, q, r) = (places[0], places[1] - places[0], places[2] - places[0]);
         let twice_area = (b - a).perp_dot(c - a);
-        let slope = |change: DVec2| if change.is_finite() { change } else { DVec2::ZERO };
-        let along_x = slope((q * (c.y - a.y) - r * (b.y - a.y)) / twice_area);
-        let along_y = slope((r * (b.x - a.x) - q * (c.x - a.x)) / twice_area);
+        let along_x = (q * (c.y - a.y) - r * (b.y - a.y)) / twice_area;
+        let along_y = (r * (b.x - a.x) - q * (c.x - a.x)) / twice_area;
+        let ramp = Ramp::new(a, p, along_x, along_y);
         let (low, high) = (p.min(p + q).min(p + r), p.max(p + q).max(p + r));
         let (low, high) = (texels.clamped(low), texels.clamped(high));
-        Some(Piece { outline, corner: a, place: p, along_x, along_y, low, high })
+        Some(Piece { outline, ramp, low, high })
     }
 
     /// Paints a span over what is there.
     #[inline(always)]
     fn paint(&self, texels: &Texels, row: i64, column: usize, out: &mut [[f32; 4]]) {
-        let away = DVec2::new(column as f64, row as f64) - self.corner;
-        let start = (self.place + self.along_x * away.x + self.along_y * away.y).as_vec2();
-        let step = self.along_x.as_vec2();
-        for (i, pixel) in out.iter_mut().enumerate() {
-            let place = (start + step * i as f32).max(self.low).min(self.high);
-            let color = texels.read(place);
-            *pixel = (color + Vec4::from_array(*pixel) * (1.0 - color.w * (1.0 / FULL))).to_array();
+        for (block, out) in out.chunks_mut(LANES).enumerate() {
+            let found = texels.look_up(self.ramp.run(column + block * LANES, row, self.low, self.high));
+            for (lane, below) in out.iter_mut().enumerate() {
+                let color = texels.read(&found, lane);
+                if color[3] == FULL {
+                    *below = color;
+                } else {
+                    let through = 1.0 - color[3] * (1.0 / FULL);
+                    *below = std::array::from_fn(|k| color[k] + below[k] * through);
+                }
+            }
         }
     }
 }
@@ -99,10 +100,11 @@ pub fn render_sheet(sheet: Sheet<'_>, texture: Texture<'_>, target: Target<'_>) 
     let pieces = pieces(sheet, &texels, samples);
     let rows = BAND_ROWS.div_ceil(samples);
     let bins = bins(&pieces, height * samples, rows * samples);
-    pixels.par_chunks_mut(rows * width).zip(bins).enumerate().for_each(|(band, (out, bin))| {
+    let bands = pixels.par_chunks_mut(rows * width).zip(bins).enumerate();
+    bands.for_each_init(Buffer::default, |buffer, (band, (out, bin))| {
         let first = band * rows * samples;
-        let mut buffer = Buffer::new(out.len() / width * samples, width * samples);
-        bin.iter().for_each(|piece| buffer.paint(&pieces[*piece as usize], &texels, first));
+        buffer.prepare(out.len() / width * samples, width * samples);
+        bin.iter().for_each(|piece| paint_piece(&pieces[*piece as usize], &texels, first, buffer));
         buffer.resolve(samples, out);
     });
     Ok(())
@@ -129,7 +131,8 @@ fn bins(pieces: &[Piece], height: usize, rows: usize) -> Vec<Vec<u32>> {
     bins
 }
 
-/// Samples of a band and the columns that were painted in each row.
+/// Samples of a band and the columns that were painted in each row. Clear outside of them.
+#[derive(Default)]
 struct Buffer {
     colors: Vec<[f32; 4]>,
     painted: Vec<Range<usize>>,
@@ -137,12 +140,15 @@ struct Buffer {
 }
 
 impl Buffer {
-    fn new(rows: usize, width: usize) -> Self {
-        Buffer { colors: vec![[0.0; 4]; rows * width], painted: vec![usize::MAX..0; rows], width }
-    }
-
-    fn paint(&mut self, piece: &Piece, texels: &Texels, first: usize) {
-        paint_piece(piece, texels, first, self);
+    /// Clears what was painted and takes the size of the next band.
+    fn prepare(&mut self, rows: usize, width: usize) {
+        for (line, columns) in self.colors.chunks_mut(self.width.max(1)).zip(&self.painted) {
+            line.get_mut(columns.clone()).unwrap_or_default().fill([0.0; 4]);
+        }
+        self.colors.resize(rows * width, [0.0; 4]);
+        self.painted.clear();
+        self.painted.resize(rows, usize::MAX..0);
+        self.width = width;
     }
 
     /// Averages the samples of each pixel and writes straight bytes.
@@ -181,14 +187,32 @@ fn paint_piece(piece: &Piece, texels: &Texels, first: usize, buffer: &mut Buffer
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
 fn resolve_row(colors: &[[f32; 4]], width: usize, samples: usize, columns: Range<usize>, out: &mut [[u8; 4]]) {
-    let share = 1.0 / (samples * samples) as f32;
-    for column in columns {
-        let mut sum = Vec4::ZERO;
-        for line in colors.chunks_exact(width) {
-            for color in &line[column * samples..(column + 1) * samples] {
-                sum += Vec4::from_array(*color);
-            }
-        }
-        out[column] = straight(sum * share);
+    if samples == 1 {
+        let (from, to) = (colors[columns.clone()].as_chunks::<LANES>(), out[columns].as_chunks_mut::<LANES>());
+        from.0.iter().zip(to.0).for_each(|(colors, out)| *out = straight(colors));
+        let mut rest = [[0.0; 4]; LANES];
+        rest[..from.1.len()].copy_from_slice(from.1);
+        to.1.iter_mut().zip(straight(&rest)).for_each(|(out, pixel)| *out = pixel);
+        return;
     }
+    let first = columns.start;
+    for (block, out) in out[columns].chunks_mut(LANES).enumerate() {
+        let mut means = [[0.0; 4]; LANES];
+        for (lane, mean) in means[..out.len()].iter_mut().enumerate() {
+            *mean = pixel_mean(colors, width, samples, first + block * LANES + lane);
+        }
+        out.iter_mut().zip(straight(&means)).for_each(|(out, pixel)| *out = pixel);
+    }
+}
+
+/// The mean of a pixel's samples.
+#[inline(always)]
+fn pixel_mean(colors: &[[f32; 4]], width: usize, samples: usize, column: usize) -> [f32; 4] {
+    let mut sum = [0.0; 4];
+    for line in colors.chunks_exact(width) {
+        for color in &line[column * samples..(column + 1) * samples] {
+            (0..4).for_each(|k| sum[k] += color[k]);
+        }
+    }
+    sum.map(|sum| sum / (samples * samples) as f32)
 }

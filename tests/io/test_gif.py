@@ -42,6 +42,13 @@ def test_what_is_transparent_stays_so_and_leaves_no_trail(tmp_path):
         assert np.array_equal(frame[want[..., 3] > 0], want[want[..., 3] > 0])
 
 
+def test_a_figure_that_comes_and_goes_leaves_nothing(tmp_path):
+    full, empty = np.full((8, 8, 4), 255, np.uint8), np.zeros((8, 8, 4), np.uint8)
+    write_gif(tmp_path / "a.gif", [full] * 24 + [empty] * 2 + [full], [4] * 27)
+    frames = read(tmp_path / "a.gif")[0]
+    assert [int(frame[..., 3].max()) for frame in frames[-4:]] == [255, 0, 0, 255]
+
+
 def test_many_colours_become_near_ones(tmp_path):
     ramp = np.stack(np.meshgrid(np.arange(256), np.arange(256)), axis=2).astype(np.uint8)
     picture = np.dstack([ramp, np.full((256, 256), 40, np.uint8)])

@@ -1,4 +1,4 @@
-"""Slow numpy transcription of the 2007 paper's section 7 (equation 4, averaging) and of what stitches and precedes it."""
+"""Slow numpy transcription of the 2007 paper's section 7 (equation 4, averaging), and what stitches and precedes it."""
 
 import numpy as np
 

@@ -31,7 +31,7 @@ def test_the_pose_as_drawn_gives_the_mesh_as_drawn():
 def test_every_vertex_is_where_the_paper_puts_it(inflation):
     puppet = arm_puppet(distance=2.0)
     pose = puppet.pose + np.array([[0, 0, 0], [0, 0, 0.2], [0, 0, -0.1]])
-    poses = turned_poses(puppet, [35.0, -50.0], elbow=0.8) + [0.1, 0.2, -0.3]
+    poses = turned_poses(puppet, [35.0, -50.0], elbow=0.8) + np.array([0.1, 0.2, -0.3])
     found = AsapShapes.of_puppet(puppet, pose, inflation=inflation).shapes(poses)
     weights, heights = bone_weights(puppet), inflation * inflation_heights(puppet)
     scale = puppet.camera.depth(pose[puppet.bones[:, 0]]) / focal_lengths(puppet.camera).mean()
@@ -63,7 +63,7 @@ def test_an_arm_towards_the_camera_keeps_its_width():
 
 def test_a_figure_that_comes_nearer_grows_all_over():
     puppet = arm_puppet(distance=4.0)
-    nearer = (puppet.pose + [0, 0, 2.0])[None]
+    nearer = (puppet.pose + np.array([0, 0, 2.0]))[None]
     asap, arap = (
         deformed_meshes(puppet, puppet.pose, nearer, Direction(shapes=shapes))[0] for shapes in ("asap", "arap")
     )
@@ -80,7 +80,7 @@ def test_a_bone_that_points_into_the_camera_is_finite_and_continuous():
     sizes = np.ptp(meshes, axis=1)
     assert np.abs(np.diff(sizes, axis=0)).max() < 2.0
     exact = turned_poses(puppet, [90.0])
-    exact[0, 1:] = exact[0, 0] + (puppet.camera.position - exact[0, 0]) * [[0.1], [0.2]]
+    exact[0, 1:] = exact[0, 0] + np.array([[0.1], [0.2]]) * (puppet.camera.position - exact[0, 0])
     shape = AsapShapes.of_puppet(puppet, puppet.pose).shapes(exact)
     assert np.isfinite(shape).all()
     assert np.isfinite(deformed_meshes(puppet, puppet.pose, exact, Direction())).all()
@@ -132,6 +132,6 @@ def test_a_figure_that_comes_to_the_camera_is_named():
     poses[2, :, 2] += 1.2
     with pytest.raises(DegenerateError, match="frame 2: the figure comes to the camera"):
         shapes.shapes(poses)
-    behind = puppet.pose + [0, 0, 2]
+    behind = puppet.pose + np.array([0, 0, 2])
     with pytest.raises(DegenerateError, match="left_shoulder"):
         AsapShapes.of_puppet(puppet, behind)

@@ -23,7 +23,7 @@ def moved(puppet, **marks):
 
 def test_the_drawn_pose_is_seen_at_the_marks():
     puppet = moved(arm_puppet(), left_hand=(210, 60), left_elbow=(160, 110))
-    pose = puppet.pose + [[0, 0, 0], [0, 0, 0.3], [0, 0, 0.7]]
+    pose = puppet.pose + np.array([[0, 0, 0], [0, 0, 0.3], [0, 0, 0.7]])
     drawn = drawn_pose(puppet.changed(pose=pose))
     assert np.allclose(puppet.camera.project(drawn), puppet.marks)
 
@@ -121,10 +121,10 @@ def test_an_upright_turn_of_the_person_is_told_and_unwound():
 def test_feet_stand_as_high_as_the_clip_s():
     clip = np.array([[[0, 1.0, 0], [0, 0.1, 0]], [[0, 1.4, 0], [0, 0.5, 0]]])
     drawn = np.array([[0, 2.0, 0], [0, 1.5, 0.0]])
-    joints = np.repeat(drawn[None], 2, axis=0) + [[[0, 3, 0]], [[0, 7, 0]]]
+    joints = np.repeat(drawn[None], 2, axis=0) + np.array([[[0, 3, 0]], [[0, 7, 0]]])
     found = ground_poses(joints, clip, drawn, clip[0], scale=0.5)
     assert np.allclose(found[0], drawn)
-    assert np.allclose(found[1], drawn + [0, 0.2, 0])
+    assert np.allclose(found[1], drawn + np.array([0, 0.2, 0]))
 
 
 def test_where_a_figure_goes():

@@ -50,7 +50,8 @@ def _neighbours(triangles: NDArray[np.int64], count: int) -> sparse.csr_array:
 
 def _nearest_bones(puppet: Puppet) -> NDArray[np.int64]:
     distances, _ = bone_distances(puppet.vertices, puppet.marks, puppet.bones)
-    return distances.argmin(axis=1)
+    nearest: NDArray[np.int64] = distances.argmin(axis=1)
+    return nearest
 
 
 def bone_distances(points: Floats, marks: Floats, bones: NDArray[np.int64]) -> tuple[Floats, Floats]:

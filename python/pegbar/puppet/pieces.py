@@ -16,7 +16,7 @@ from pegbar.errors import DegenerateError
 class Guides:
     """Vertices that stand in for a second handle of pieces that have handles at one place only.
 
-    ``vertices`` (g,) int are these vertices, ``arms`` (g,) complex where they lie from their handle at rest, ``anchors``
+    ``vertices`` (g,) int are these vertices, ``arms`` (g,) complex how they lie from their handle at rest, ``anchors``
     (g,) int the handles' indices in the list of handles, ``weights`` (g, h) float how much each other handle says about
     the turn of the piece.
     """
