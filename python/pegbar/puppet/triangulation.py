@@ -78,12 +78,14 @@ def triangulate(
     rings = [*_rings("outlines", outlines), *_rings("holes", holes)]
     inner = arrays.floats("points", points, ("p", 2))
     pairs = arrays.integers("segments", segments, ("s", 2), low=0, high=len(inner) - 1)
+    if (pairs[:, 0] == pairs[:, 1]).any():
+        raise ValueError(f"segments[{int(np.argmax(pairs[:, 0] == pairs[:, 1]))}]: want two different points")
     distance = _spacing(spacing, max_area)
     named = [(ring, index >= len(outlines)) for index, ring in enumerate(rings)]
     names = _names(len(outlines), rings, len(inner))
     given = np.concatenate([*rings, inner])
     _refuse_same(given, names)
-    loops, added = _split(rings, len(given), distance if split_edges else None)
+    loops, added = _split(rings, given, distance if split_edges else None)
     vertices = np.concatenate([given, added])
     around = [np.stack([loop, np.roll(loop, -1)], axis=1) for loop in loops]
     edges = np.concatenate([*around, pairs + len(given) - len(inner)])
@@ -93,7 +95,7 @@ def triangulate(
     if len(crossing):
         raise ValueError(_describe_crossing(vertices, edges, crossing[0].astype(np.int64), names))
     faces = corners.astype(np.int64)
-    faces = faces[_kernels.inside_rings(np.ascontiguousarray(vertices[faces].mean(axis=1)), named)]
+    faces = faces[_wide(vertices[faces]) & _kernels.inside_rings(vertices[faces].mean(axis=1), named)]
     _refuse_unused(faces, len(given), names)
     return Triangulation(vertices, faces, tuple(loops), np.arange(len(given) - len(inner), len(given)))
 
@@ -136,20 +138,26 @@ def _refuse_same(given: NDArray[np.float64], names: list[str]) -> None:
 
 
 def _split(
-    rings: list[NDArray[np.float64]], count: int, distance: float | None
+    rings: list[NDArray[np.float64]], given: NDArray[np.float64], distance: float | None
 ) -> tuple[list[NDArray[np.int64]], NDArray[np.float64]]:
-    """Loops of vertices along the rings, and the places that were added on their long edges."""
+    """Loops of vertices along the rings, and the places that were added on their long edges.
+
+    No place is added beside a given one: a point on an edge splits it as well.
+    """
     starts = np.cumsum([0, *map(len, rings)])
+    tree, count = cKDTree(given), len(given)
     loops, added = [], [np.empty((0, 2))]
     for start, ring in zip(starts, rings, strict=False):
         loop = []
         for index, (a, b) in enumerate(zip(ring, np.roll(ring, -1, axis=0), strict=True)):
             loop.append(start + index)
             parts = 1 if distance is None else math.ceil(np.linalg.norm(b - a) / distance - 1e-9)
-            if parts > 1:
-                loop.extend(range(count, count + parts - 1))
-                count += parts - 1
-                added.append(a + (b - a) * (np.arange(1, parts) / parts)[:, None])
+            if distance is not None and parts > 1:
+                places = a + (b - a) * (np.arange(1, parts) / parts)[:, None]
+                places = places[tree.query(places)[0] >= distance / 4]
+                loop.extend(range(count, count + len(places)))
+                count += len(places)
+                added.append(places)
         loops.append(np.array(loop, np.int64))
     return loops, np.concatenate(added)
 
@@ -174,6 +182,17 @@ def _regular(
         samples.append(a + (b - a) * (np.arange(1, parts) / max(parts, 1))[:, None])
     away = cKDTree(np.concatenate(samples)).query(places)[0]
     return np.ascontiguousarray(places[away >= distance / 2])
+
+
+def _wide(corners: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Whether triangles (T, 3, 2) have an area: those between places that rounding has put beside an edge have none.
+
+    Such a triangle lies outside: inside, Delaunay's rule joins the middle place to what lies opposite.
+    """
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    twice_area = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+    wide: NDArray[np.bool_] = twice_area > 1e-12 * ((a**2).sum(axis=1) + (b**2).sum(axis=1))
+    return wide
 
 
 def _describe_crossing(
