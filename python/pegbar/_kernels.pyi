@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
-    "Deformer",
     "SOURCES",
+    "Deformer",
     "average_triangles",
     "composite_matte",
     "constrained_delaunay",
