@@ -7,6 +7,7 @@ __all__ = [
     "SOURCES",
     "Deformer",
     "average_triangles",
+    "capsule_distances",
     "composite_matte",
     "constrained_delaunay",
     "convert_srgb",
@@ -26,7 +27,9 @@ __all__ = [
     "limb_depth",
     "limb_depths",
     "matte",
+    "over_ground",
     "own_alpha",
+    "pack_gif_frames",
     "palette_labels",
     "parse_amc",
     "parse_bvh",
@@ -38,6 +41,7 @@ __all__ = [
     "search_clips",
     "segment_path",
     "segment_stick_figure",
+    "step_cloth",
     "stroke_polyline",
     "time_warp",
     "unpremultiply",
@@ -47,6 +51,7 @@ SOURCES: str
 
 _Floats = NDArray[np.float32]
 _Doubles = NDArray[np.float64]
+_Indices = NDArray[np.uint32]
 _Pictures = tuple[_Floats, _Floats, _Floats, NDArray[np.uint16]]
 
 def convert_srgb(pixels: NDArray[np.float32], encode: bool) -> NDArray[np.float32]: ...
@@ -80,6 +85,10 @@ def length_costs(
 def segment_stick_figure(
     gray: NDArray[np.uint8], ends: NDArray[np.float64], half_widths: NDArray[np.float64], threshold: int
 ) -> NDArray[np.uint8]: ...
+def over_ground(drawn: NDArray[np.uint8], ground: NDArray[np.uint8]) -> NDArray[np.uint8]: ...
+def pack_gif_frames(
+    frames: NDArray[np.uint8], table: NDArray[np.uint8], previous: NDArray[np.uint8] | None
+) -> list[tuple[list[int], bytes]]: ...
 def palette_labels(
     segmentation: NDArray[np.uint8], colors: NDArray[np.uint8], labels: NDArray[np.uint8], tolerance: float
 ) -> tuple[NDArray[np.uint8], int, list[int] | None]: ...
@@ -176,3 +185,17 @@ def constrained_delaunay(
     points: _Doubles, edges: NDArray[np.uint32]
 ) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]: ...
 def inside_rings(places: _Doubles, rings: list[tuple[_Doubles, bool]]) -> NDArray[np.bool_]: ...
+def capsule_distances(points: _Doubles, capsules: _Doubles) -> tuple[_Doubles, NDArray[np.uint32]]: ...
+def step_cloth(
+    made: tuple[_Doubles, _Indices, _Indices, _Doubles, _Indices, _Doubles, _Indices, _Doubles, _Indices, _Doubles],
+    acting: tuple[
+        tuple[float, float],
+        tuple[float, tuple[float, float, float]],
+        tuple[float, float, float, float, float],
+        int,
+    ],
+    air: _Doubles,
+    pins: tuple[_Indices, _Doubles],
+    capsules: _Doubles,
+    state: tuple[_Doubles, _Doubles],
+) -> None: ...

@@ -1,10 +1,9 @@
 //! Wrapper of `kernels/gif.rs`.
 
-use crate::arrays::{grouped, slice};
+use crate::arrays::slice;
 use crate::errors::to_python;
 use numpy::{PyReadonlyArray1, PyReadonlyArray4, PyReadwriteArray2, PyUntypedArrayMethods};
 use pegbar_kernels::gif;
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
@@ -19,12 +18,9 @@ pub fn pack_gif_frames<'py>(
     previous: Option<PyReadwriteArray2<'py, u8>>,
 ) -> PyResult<Vec<Packed<'py>>> {
     let [height, width, channels] = [frames.shape()[1], frames.shape()[2], frames.shape()[3]];
-    if channels != 4 {
-        return Err(PyValueError::new_err("frames: want RGBA"));
-    }
-    let (pixels, entries): (&[[u8; 4]], _) = (grouped("frames", &frames)?, slice("table", &table)?);
+    let (pixels, entries) = (slice("frames", &frames)?, slice("table", &table)?);
     let mut previous = previous;
     let before = previous.as_mut().map(|array| array.as_slice_mut()).transpose()?;
-    let packed = py.detach(|| gif::pack_frames(pixels, width, height, entries, before)).map_err(to_python)?;
+    let packed = py.detach(|| gif::pack_frames(pixels, channels, width, height, entries, before)).map_err(to_python)?;
     Ok(packed.into_iter().map(|frame| (frame.place, PyBytes::new(py, &frame.data))).collect())
 }

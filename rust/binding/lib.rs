@@ -3,6 +3,7 @@
 mod amc;
 mod arrays;
 mod bvh;
+mod cloth;
 mod color;
 mod composite;
 mod deform;
@@ -16,6 +17,7 @@ mod holdout;
 mod kinematics;
 mod lift;
 mod matte;
+mod over;
 mod paint;
 mod palette;
 mod pose;
@@ -41,6 +43,8 @@ mod _kernels {
     #[pymodule_export]
     use crate::bvh::parse_bvh;
     #[pymodule_export]
+    use crate::cloth::{capsule_distances, step_cloth};
+    #[pymodule_export]
     use crate::color::convert_srgb;
     #[pymodule_export]
     use crate::composite::depth_composite;
@@ -64,6 +68,8 @@ mod _kernels {
     use crate::lift::lift_markers;
     #[pymodule_export]
     use crate::matte::{fill_matte, has_alpha, ink_alpha, matte, own_alpha};
+    #[pymodule_export]
+    use crate::over::over_ground;
     #[pymodule_export]
     use crate::paint::{fill_polygon, stroke_polyline, unpremultiply};
     #[pymodule_export]

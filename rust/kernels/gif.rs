@@ -27,12 +27,13 @@ pub struct Packed {
     pub data: Vec<u8>,
 }
 
-/// Packs frames of `width` x `height` straight RGBA pixels that follow each other.
+/// Packs frames of `width` x `height` RGB or straight RGBA pixels that follow each other.
 ///
 /// `previous` holds the indices of the frame before the first: what does not change is left out, in place of what is
 /// transparent, and the last frame's indices are put there. Without it frames are transparent where their alpha is low.
 pub fn pack_frames(
-    frames: &[[u8; 4]],
+    frames: &[u8],
+    channels: usize,
     width: usize,
     height: usize,
     table: &[u8],
@@ -40,13 +41,15 @@ pub fn pack_frames(
 ) -> Result<Vec<Packed>, KernelError> {
     let size = width * height;
     check_length("table", TABLE, table.len())?;
-    if size == 0 || width > 65535 || height > 65535 || !frames.len().is_multiple_of(size) {
+    let whole = matches!(channels, 3 | 4) && size > 0 && frames.len().is_multiple_of(size * channels);
+    if !whole || width > 65535 || height > 65535 {
         return Err(KernelError::Argument {
             argument: "frames",
             problem: "want whole frames of 1 to 65535 pixels a side",
         });
     }
-    let indexed: Vec<Vec<u8>> = frames.par_chunks_exact(size).map(|frame| indices(frame, table)).collect();
+    let indexed: Vec<Vec<u8>> =
+        frames.par_chunks_exact(size * channels).map(|frame| indices(frame, channels, table)).collect();
     let Some(last) = previous else {
         return Ok(indexed.par_iter().map(|frame| pack(frame, None, width, height)).collect());
     };
@@ -63,12 +66,15 @@ pub fn pack_frames(
 }
 
 /// The palette's index of every pixel.
-fn indices(frame: &[[u8; 4]], table: &[u8]) -> Vec<u8> {
-    let index = |&[red, green, blue, alpha]: &[u8; 4]| {
-        let entry = (usize::from(red >> 3) << 10) | (usize::from(green >> 3) << 5) | usize::from(blue >> 3);
-        if alpha < OPAQUE { CLEAR } else { table[entry] }
+fn indices(frame: &[u8], channels: usize, table: &[u8]) -> Vec<u8> {
+    let index = |red: u8, green: u8, blue: u8| {
+        table[(usize::from(red >> 3) << 10) | (usize::from(green >> 3) << 5) | usize::from(blue >> 3)]
     };
-    frame.iter().map(index).collect()
+    if channels == 3 {
+        return frame.as_chunks().0.iter().map(|&[red, green, blue]| index(red, green, blue)).collect();
+    }
+    let shown = |&[red, green, blue, alpha]: &[u8; 4]| if alpha < OPAQUE { CLEAR } else { index(red, green, blue) };
+    frame.as_chunks().0.iter().map(shown).collect()
 }
 
 /// The smallest rectangle that holds what is shown, packed; one pixel where nothing is.
@@ -265,7 +271,7 @@ mod tests {
         frames[12 + 5] = [255, 0, 0, 255];
         frames[12 + 7] = [255, 0, 0, 255];
         let mut previous = vec![0; 12];
-        let packed = pack_frames(&frames, 4, 3, &table, Some(&mut previous)).unwrap();
+        let packed = pack_frames(frames.as_flattened(), 4, 4, 3, &table, Some(&mut previous)).unwrap();
         assert_eq!(packed[0].place, [0, 0, 1, 1]);
         assert_eq!(packed[1].place, [1, 1, 3, 1]);
         assert_eq!(expand(&packed[1].data), [31, CLEAR, 31]);
@@ -277,7 +283,7 @@ mod tests {
         let table = vec![7; TABLE];
         let mut frame = vec![[9, 9, 9, 127]; 6];
         frame[4][3] = 128;
-        let packed = pack_frames(&frame, 3, 2, &table, None).unwrap();
+        let packed = pack_frames(frame.as_flattened(), 4, 3, 2, &table, None).unwrap();
         assert_eq!((packed[0].place, expand(&packed[0].data)), ([1, 1, 1, 1], vec![7]));
     }
 }

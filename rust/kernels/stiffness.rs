@@ -12,7 +12,7 @@ use crate::ldl::{Entry, Factor, Upper};
 use glam::DVec2;
 
 /// Edges are counted as no shorter than this part of the mean edge: ratios of weights stay within what solves well.
-const SHORTEST: f64 = 1e-3;
+const SHORTEST: f64 = 0.02;
 
 /// The power of an edge's squared length that weighs its error. At -1 errors are relative; a little less keeps the short
 /// edges of a finely cut rim better still, and flat triangles, which count less, then fold no oftener (docs/papers.md).
@@ -22,7 +22,7 @@ const SHORT_EDGES: f64 = -1.25;
 const FLATTEST: f64 = 0.01;
 
 /// How much a hinge resists bending, relative to a triangle: enough to be solved, too little to be seen.
-const HINGE: f64 = 1e-4;
+const HINGE: f64 = 1e-2;
 
 /// An entry of a matrix: row, column, value.
 type Triplet<E> = (u32, u32, E);
@@ -74,7 +74,7 @@ pub fn similar(
         for k in 0..3 {
             if w.edges[k] == DVec2::ZERO {
                 // Corners in one place: no ratio of edges holds them together.
-                spring(corners[(k + 1) % 3], corners[(k + 2) % 3], DVec2::X * w.stitch[k], &mut out);
+                spring(corners[(k + 1) % 3], corners[(k + 2) % 3], DVec2::X, &mut out);
             }
         }
     }

@@ -39,7 +39,7 @@ def deform(vertices, triangles, handles, positions, shapes=None, iterations=1, s
     triangles, n = np.asarray(triangles), len(z)
     edges = np.roll(z[triangles], -1, 1) - np.roll(z[triangles], -2, 1)
     unit = (np.abs(edges) ** 2).mean()
-    squared = np.maximum(np.abs(edges) ** 2 / unit, 1e-6)
+    squared = np.maximum(np.abs(edges) ** 2 / unit, 4e-4)
     area = np.abs((edges[:, 0].conj() * edges[:, 1]).imag) / unit
     stitching = np.sqrt(np.maximum(area / squared.sum(1), 0.01))[:, None] * squared**-1.25
     similar = np.zeros((n, n), complex)

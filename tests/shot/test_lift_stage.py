@@ -1,4 +1,5 @@
 import csv
+import dataclasses
 import json
 
 import cv2
@@ -228,6 +229,52 @@ def test_squash_and_stretch_is_kept_as_lengths_of_bones(again):
     lengths = np.linalg.norm(posed[:, 1] - posed[:, 0], axis=1)
     np.testing.assert_allclose(held["bone_scales"][:, joint], lengths / np.median(lengths), atol=1e-3)
     assert np.ptp(held["bone_scales"][:, joint]) > 0.01
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "said"),
+    [
+        (lambda clip: clip.slice(0, 1), 2, "one.bvh: too short"),
+        (lambda clip: still(clip), 0, "the clip stands still"),
+    ],
+    ids=["one frame", "all poses equal"],
+)
+def test_a_clip_that_says_too_little_is_named(made, capsys, change, code, said):
+    folder = made.parent
+    write_bvh(folder / "one.bvh", change(read_motion(folder / "clip.bvh")))
+    other = folder / "other.toml"
+    text = made.read_text().replace('path = "clip.bvh"', 'path = "one.bvh"').split("[lift]")[0]
+    other.write_text(text + '[lift]\noutput = "bad"\npreview = "none"\n[align]\noutput = "bad/align"\n')
+    assert main(["lift", str(other)]) == code
+    assert said in capsys.readouterr().err
+    if code == 0:
+        assert np.isfinite(read_motion(folder / "bad/animation.bvh").positions).all()
+
+
+def test_a_joint_that_the_clip_lacks_is_said_and_left_out(made, capsys):
+    folder = made.parent
+    clip = read_motion(folder / "clip.bvh")
+    write_bvh(
+        folder / "bald.bvh", dataclasses.replace(clip, names=tuple(name.replace("head", "x") for name in clip.names))
+    )
+    (folder / "joints.toml").write_text('head = ""\n')
+    other = folder / "lacking.toml"
+    text = made.read_text().replace('path = "clip.bvh"', 'path = "bald.bvh"\njoints = "joints.toml"').split("[lift]")[0]
+    other.write_text(text + '[lift]\noutput = "lack"\npreview = "none"\n[align]\noutput = "lack/align"\n')
+    code = main(["lift", str(other)])
+    errors = capsys.readouterr().err
+    assert code == 0, errors
+    assert "the clip has no joint for head: left out" in errors
+    assert "head" not in np.load(folder / "lack/markers.npz")["names"].tolist()
+    (folder / "joints.toml").write_text('left_elbow = ""\n')
+    assert main(["lift", str(other)]) == 2
+    assert "bald.bvh: no left_elbow, without which it cannot be compared" in capsys.readouterr().err
+
+
+def still(clip):
+    """As many frames, all the first."""
+    frames = len(clip.positions)
+    return clip.changed(positions=clip.positions[:1].repeat(frames, 0), rotations=clip.rotations[:1].repeat(frames, 0))
 
 
 def test_one_frame_a_drawing_and_a_preview(made, again):

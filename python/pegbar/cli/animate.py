@@ -28,6 +28,7 @@ from pegbar.shot.animating import (
     find_pictures,
     picture_name,
 )
+from pegbar.shot.puppet import PuppetOptions
 
 
 @Parameter(name="*")
@@ -48,10 +49,22 @@ class FigureOptions:
     field_of_view: Annotated[
         float | None, Parameter(help="Horizontal, in degrees: smaller is less perspective (default: found).")
     ] = None
+    completion: Annotated[
+        Literal["auto", "patch", "diffuse", "flat"], Parameter(help="How hidden parts are filled in.")
+    ] = "auto"
+    pieces: Annotated[
+        Literal["join", "drop"], Parameter(help="What is done with pieces of the mask that no limb runs through.")
+    ] = "join"
+    matting: Annotated[
+        Literal["auto", "closed form", "guided", "mask"], Parameter(help="How soft edges are found.")
+    ] = "auto"
     mirror: Annotated[bool, Parameter(negative="", help="Perform the clip's mirror image.")] = False
+    keep_puppets: Annotated[
+        bool, Parameter(help="Keep what is found of a picture, in .pegbar beside the output, for its next clip.")
+    ] = True
 
-    def casting(self) -> Casting:
-        """As values, checked."""
+    def casting(self, folder: Path) -> Casting:
+        """As values, checked; puppets are kept beside what is in ``folder``."""
         wide = self.field_of_view
         if wide is not None and not 0 < wide < 180:
             raise ValueError(f"--field-of-view: want degrees between 0 and 180, got {wide}")
@@ -62,10 +75,16 @@ class FigureOptions:
             joints=self.joints,
             mask=self.mask,
             drives={joint.strip(): marker.strip() for joint, _, marker in pairs},
-            view=self.view,
-            layer_order=None if self.layers is None else tuple(name.strip() for name in self.layers.split(",")),
-            field_of_view=None if wide is None else math.radians(wide),
+            options=PuppetOptions(
+                view=self.view,
+                layer_order=None if self.layers is None else tuple(name.strip() for name in self.layers.split(",")),
+                field_of_view=None if wide is None else math.radians(wide),
+                completion=self.completion,
+                pieces=self.pieces,
+                matting=self.matting,
+            ),
             mirror=self.mirror,
+            keep=folder / ".pegbar" / "puppets" if self.keep_puppets else None,
         )
 
 
@@ -90,7 +109,7 @@ class MovementOptions:
     transition: Annotated[float, Parameter(help="Seconds from the drawn pose to the clip's first.")] = 0.0
     between: Annotated[float, Parameter(help="Seconds from one clip to the next.")] = 0.3
     loop: Annotated[bool, Parameter(negative="", help="Cut and blend so that it repeats without a jump.")] = False
-    inflation: Annotated[float, Parameter(help="How round the figure is: 0 flat, 1 as deep as wide.")] = 1.0
+    inflation: Annotated[float, Parameter(help="How round the figure is: 0 flat, 1 as deep as wide.")] = 0.5
 
     def direction(self) -> Direction:
         """As values, checked."""
@@ -165,7 +184,7 @@ def animate(
     pictures
         Pictures with their joints beside them, or folders of such.
     """
-    casting, direction = (figure or FigureOptions()).casting(), (movement or MovementOptions()).direction()
+    direction = (movement or MovementOptions()).direction()
     setting = (look or PictureOptions()).setting()
     cast = [picture for path in pictures for picture in find_pictures(path)]
     clips = [found for path in clip for found in find_clips(path)]
@@ -174,7 +193,7 @@ def animate(
     jobs = list(_jobs(cast, clips, output, format))
     for _, target in jobs:
         check_film(target, alpha=setting.background == "transparent")
-    failed = 0
+    casting, failed = (figure or FigureOptions()).casting(jobs[0][1].parent), 0
     for parts, target in jobs:
         try:
             with _bar(target.name) as advance:

@@ -67,8 +67,9 @@ pegbar depth and composite then use.
 Example: pegbar align my_shot/shot.toml""",
     "lift": """Make a 3D animation of a drawn sequence, with the artist's poses and timing.
 
-Aligns the shot first where that is out of date. Writes the clip's skeleton posed as drawn (BVH, glTF, USD), the 3D
-markers (CSV, npz), a sheet to look at and a report.
+Aligns the shot first where that is out of date. Writes a skeleton posed as drawn (BVH, glTF, USD), the 3D markers
+(CSV, npz), a sheet and an animation to look at, and a report. The shot file's [lift] chooses the skeleton (the clip's or
+your rig's), the frame rate, loops, standing feet, held joints, and limbs whose depth is to be turned.
 
 Example: pegbar lift my_shot/shot.toml""",
     "animate": """Let a drawn or photographed figure perform a motion capture clip.

@@ -6,6 +6,7 @@ Colours are the weighted means of boxes that median cut finds, then two rounds o
 
 from __future__ import annotations
 
+import itertools
 import os
 import struct
 from collections.abc import Iterable, Iterator, Sequence
@@ -35,7 +36,7 @@ def write_gif(path: str | os.PathLike[str], frames: Iterable[ArrayLike], duratio
     path : path
     frames : iterable of (H, W, 3|4) uint8
         RGB or straight RGBA of one size; taken as they come, a block of them held in memory. Alpha below a half is
-        transparent.
+        transparent. RGB packs better: only what changes is kept.
     durations : iterable of int
         Hundredths of a second, as many as frames.
 
@@ -49,15 +50,13 @@ def write_gif(path: str | os.PathLike[str], frames: Iterable[ArrayLike], duratio
 
 
 def _checked(frames: Iterable[ArrayLike]) -> Iterator[Pixels]:
-    """The frames as RGBA, all of the first one's size."""
+    """The frames, all of the first one's size and channels."""
     shape: tuple[int, ...] = ()
     for index, frame in enumerate(frames):
-        picture = arrays.image(f"frames[{index}]", frame)
+        picture = arrays.image(f"frames[{index}]", frame, (shape[2],) if shape else (3, 4))
         if shape:
             arrays.same_size(f"frames[{index}]", picture, "the first frame", shape)
         shape = picture.shape
-        if shape[2] == 3:
-            picture = np.dstack([picture, np.full(shape[:2], 255, np.uint8)])
         yield picture
 
 
@@ -65,18 +64,17 @@ def _encoded(frames: Iterator[Pixels], durations: Iterator[int]) -> Iterator[byt
     """The file's bytes, piece by piece."""
     known: Scene | None = None
     previous: Pixels | None = None
-    while block := [frame for frame, _ in zip(frames, range(_BLOCK), strict=False)]:
+    while block := list(itertools.islice(frames, _BLOCK)):
         pixels = np.stack(block)
-        transparent = bool((pixels[..., 3] < 128).any())
+        # A frame that shows nothing where the one before did must not be laid over it.
+        transparent = pixels.shape[3] == 4
         if known is None:
             height, width = pixels.shape[1:3]
             yield b"GIF89a" + struct.pack("<HHBBB", width, height, 0x70, 0, 0)
             yield b"\x21\xff\x0bNETSCAPE2.0\x03\x01\0\0\0"
         if known is None or known.unknown(pixels) > _NEW_SCENE:
             known, previous = Scene(pixels), None
-        if transparent:
-            previous = None
-        elif previous is None:
+        if previous is None and not transparent:
             previous = np.full(pixels.shape[1:3], _CLEAR, np.uint8)
         for place, data in _kernels.pack_gif_frames(pixels, known.table, previous):
             yield _frame(place, data, known.palette, next(durations), disposal=2 if transparent else 1)
@@ -98,8 +96,10 @@ class Scene:
     """
 
     def __init__(self, frames: Pixels) -> None:
-        looked_at = frames[np.unique(np.linspace(0, len(frames) - 1, _LOOKED_AT).astype(int))]
-        shown = looked_at[looked_at[..., 3] >= 128][:, :3]
+        looked_at: Pixels = frames[np.unique(np.linspace(0, len(frames) - 1, _LOOKED_AT).astype(int))]
+        # Every pixel of small pictures, every second or third of large ones.
+        stride = max(1, round((looked_at.shape[1] * looked_at.shape[2] / 1e5) ** 0.5))
+        shown = _shown(looked_at[:, ::stride, ::stride])
         if not len(shown):
             shown = np.zeros((1, 3), np.uint8)
         bins = _bins(shown)
@@ -113,24 +113,30 @@ class Scene:
         grid = np.indices((32, 32, 32)).reshape(3, -1).T * 8 + 4.0
         # A colour that occurs is found by what it is, not by the middle of its bin.
         grid[used] = means
-        self.table = cKDTree(colours).query(grid)[1].astype(np.uint8)
+        self.table: Pixels = np.asarray(cKDTree(colours).query(grid)[1], np.uint8)
         self.seen = np.zeros(1 << 15, bool)
         self.seen[used] = True
 
     def unknown(self, frames: Pixels) -> float:
         """The share of the pixels of ``frames`` (F, H, W, 4) whose colours are not near any that were seen."""
-        sample = frames[::8, ::4, ::4].reshape(-1, 4)
-        sample = sample[sample[:, 3] >= 128]
+        sample = _shown(frames[::8, ::4, ::4])
         if not len(sample):
             return 0.0
-        cells = self.seen.reshape(8, 4, 8, 4, 8, 4).any(axis=(1, 3, 5))
-        red, green, blue = (sample[:, :3] >> 5).T
+        cells = np.asarray(self.seen.reshape(8, 4, 8, 4, 8, 4).any(axis=(1, 3, 5)))
+        red, green, blue = (sample >> 5).T
         return float(1 - cells[red, green, blue].mean())
+
+
+def _shown(frames: Pixels) -> Pixels:
+    """The colours (N, 3) of what is not transparent."""
+    pixels = frames.reshape(-1, frames.shape[-1])
+    return pixels if pixels.shape[1] == 3 else pixels[pixels[:, 3] >= 128][:, :3]
 
 
 def _bins(colours: Pixels) -> NDArray[np.intp]:
     red, green, blue = (colours.astype(np.intp) >> 3).T
-    return red << 10 | green << 5 | blue
+    bins: NDArray[np.intp] = red << 10 | green << 5 | blue
+    return bins
 
 
 def _median_cut(colours: NDArray[Any], weights: NDArray[Any]) -> NDArray[Any]:

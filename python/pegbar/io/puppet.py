@@ -26,7 +26,12 @@ _PUPPET, _FIGURE = "puppet", "figure"
 
 def write_puppet(path: _Path, puppet: Puppet) -> None:
     """Write ``puppet`` as a .npz file, complete or not at all."""
-    words = {"kind": _PUPPET, "names": puppet.names, "drives": dict(puppet.drives), "layers": puppet.layers}
+    words: dict[str, Any] = {
+        "kind": _PUPPET,
+        "names": puppet.names,
+        "drives": dict(puppet.drives),
+        "layers": puppet.layers,
+    }
     words |= {name: getattr(puppet, name) for name in ("view", "image_size", "pose_frame", "clip", "fitted", "notes")}
     arrays = _arrays(puppet) | {"camera": puppet.camera.matrix}
     arrays |= {f"texture_{index}": texture for index, texture in enumerate(puppet.textures)}
@@ -51,7 +56,12 @@ def read_puppet(path: _Path) -> Puppet:
 
 def write_figure(path: _Path, figure: PuppetInput) -> None:
     """Write a prepared figure as a .npz file, without its picture, complete or not at all."""
-    words = {"kind": _FIGURE, "names": figure.names, "drives": dict(figure.drives), "photo": figure.photo}
+    words: dict[str, Any] = {
+        "kind": _FIGURE,
+        "names": figure.names,
+        "drives": dict(figure.drives),
+        "photo": figure.photo,
+    }
     words |= {"notes": figure.notes, "limbs": [[limb.name, limb.start, limb.end, limb.color] for limb in figure.limbs]}
     arrays = _arrays(figure)
     del arrays["image"]

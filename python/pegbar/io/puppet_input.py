@@ -102,6 +102,7 @@ def read_puppet_input(
         notes=skeleton.notes,
         segmentation=_segmentation(drawing, place, image),
         limbs=tuple(limb for limb in drawing.limbs if limb.color is not None),
+        files=(given, Path(joints), *masks, *drawing.segmentations[place : place + 1]),
     )
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pegbar import _kernels
 from pegbar.lift.given import Given, Refinement
+from pegbar.lift.hinges import breaks, hinge
 from pegbar.lift.lengths import Drawn, clip_lengths, likely_lengths
 from pegbar.lift.pins import meet_lengths, planted_targets
 from pegbar.lift.projection import known
@@ -35,7 +36,8 @@ LEAST_JOLT, LEAST_DOUBT = 2e-3, 2e-2
 DOUBT = 2.0
 #: A rigid limb may jolt this many times more than the clip's does.
 LOOSER = 2.0
-
+#: Where limbs change their lengths, foreshortening is doubted by so many times that change.
+SQUASH = 2.0
 
 #: Drawn lengths change this much (relative) over time because poses differ from the clip's.
 POSE = 0.03
@@ -45,7 +47,10 @@ NO_LENGTH = 1e-4
 
 @dataclass
 class _Figure:
-    """The drawn figure as far as it is solved; ``points`` are filled from the root outwards."""
+    """The drawn figure as far as it is solved; ``points`` are filled from the root outwards.
+
+    ``above`` says which marker each one hangs on.
+    """
 
     points: Floats
     prior: Floats
@@ -55,6 +60,7 @@ class _Figure:
     scales: Floats
     stretch: float
     change: float
+    above: dict[int, int]
 
 
 def refine_markers(given: Given, options: Refinement) -> tuple[Floats, Floats]:
@@ -116,7 +122,17 @@ def _start(given: Given, links: list[Link], options: Refinement) -> _Figure:
     # Rigid limbs of lengths that are told do not change; of lengths to be found, only as far as poses do not explain.
     stretch = drawn_as.stretch
     change = stretch if options.stretch else 0.0 if lengths is not None else math.sqrt(max(stretch**2 - POSE**2, 0))
-    return _Figure(points, prior, smooth, sight_rays(filled, cameras), noise, scales, stretch, change)
+    return _Figure(
+        points,
+        prior,
+        smooth,
+        sight_rays(filled, cameras),
+        noise,
+        scales,
+        stretch,
+        change,
+        {child: parent for parent, child, _ in links},
+    )
 
 
 def _told_scales(scales: Floats, prior: Floats, links: list[Link], lengths: Floats) -> Floats:
@@ -174,12 +190,15 @@ def _solve_level(figure: _Figure, links: list[Link], lengths: Floats | None, opt
     """Place the markers at the ends of ``links``; returns the links' lengths (links, F)."""
     level = _observed(figure, links)
     found = _level_lengths(level, lengths)
+    level.drawn[1][:] = _unbroken(figure, level, found)
     depths = _flipped(_kernels.limb_depths(level.drawn, found), links, options.flips)
     here, marked = figure.points[:, level.parents], _of(figure.marked, level.children)
     if options.stretch:
         soft = _soft_depths(level, depths, found, figure.stretch).T
         figure.points[:, level.children] = _onto_rays(here, marked) + soft[..., None] * marked[1]
         return found
+    if figure.change > 0:
+        depths = np.ascontiguousarray(_soft_depths(level, depths, found, SQUASH * figure.stretch))
     tracks = LimbTracks(
         across=(_onto_rays(here, marked) - here).swapaxes(0, 1),
         rays=marked[1].swapaxes(0, 1),
@@ -190,6 +209,25 @@ def _solve_level(figure: _Figure, links: list[Link], lengths: Floats | None, opt
     )
     figure.points[:, level.children] = here + rigid_limbs(tracks, depths, found).swapaxes(0, 1)
     return found
+
+
+def _unbroken(figure: _Figure, level: _Level, lengths: Floats) -> Floats:
+    """The clip's depths (V, F), turned where they would break a joint that in the clip bends to one side alone."""
+    depths = level.drawn[1].copy()
+    for row, (here, end, _) in enumerate(level.links):
+        above = figure.above.get(here)
+        clip = figure.prior[:, here]
+        joint = None if above is None else hinge(clip - figure.prior[:, above], figure.prior[:, end] - clip)
+        if joint is None:
+            continue
+        place = figure.points[:, here]
+        starts, rays = (part[:, end] for part in figure.smooth)
+        across = _onto_rays(place, (starts, rays)) - place
+        size = np.sqrt(np.maximum(lengths[row] ** 2 - np.sum(across**2, axis=1), 0))
+        away = np.copysign(size, depths[row])[:, None] * rays
+        broken = breaks(joint, place - figure.points[:, above], across + away, across - away)
+        depths[row] = np.where(broken, -depths[row], depths[row])
+    return depths
 
 
 def _soft_depths(level: _Level, depths: Floats, lengths: Floats, stretch: float) -> Floats:

@@ -157,9 +157,9 @@ def _onto_plane(camera: PerspectiveCamera, pixels: Floats, origin: Floats, norma
     normal = normal + max(0.0, _STEEPEST - float(normal @ view)) * view
     rays = camera.unproject(pixels, np.ones(len(pixels))) - camera.position
     falls = rays @ normal
-    # A ray may still run along the plane far from the bone: it is stopped at four times the bone's distance.
+    # A ray may still run along the plane far from the bone: it is stopped at four times the bone's depth.
     distance = (origin - camera.position) @ normal
-    steepest = distance / 4
+    steepest = distance / (4 * camera.depth(origin))
     falls = np.minimum(falls, steepest) if distance < 0 else np.maximum(falls, steepest)
     points: Floats = camera.position + rays * (distance / falls)[:, None]
     return points

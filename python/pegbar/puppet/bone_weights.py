@@ -22,8 +22,8 @@ def bone_weights(puppet: Puppet, *, rounds: int = 2) -> Floats:
     count, bones = len(puppet.vertices), len(puppet.bones)
     owned = puppet.triangle_bone >= 0
     corners = puppet.triangles[owned]
-    first, second, third = (puppet.vertices[corners[:, corner]] for corner in range(3))
-    areas = np.abs(np.cross(second - first, third - first)) + 1e-12
+    sides = puppet.vertices[corners[:, 1:]] - puppet.vertices[corners[:, :1]]
+    areas = np.abs(np.linalg.det(sides)) + 1e-12
     weights = np.zeros((count, bones))
     for corner in range(3):
         np.add.at(weights, (corners[:, corner], puppet.triangle_bone[owned]), areas)
@@ -50,7 +50,8 @@ def _neighbours(triangles: NDArray[np.int64], count: int) -> sparse.csr_array:
 
 def _nearest_bones(puppet: Puppet) -> NDArray[np.int64]:
     distances, _ = bone_distances(puppet.vertices, puppet.marks, puppet.bones)
-    return distances.argmin(axis=1)
+    nearest: NDArray[np.int64] = distances.argmin(axis=1)
+    return nearest
 
 
 def bone_distances(points: Floats, marks: Floats, bones: NDArray[np.int64]) -> tuple[Floats, Floats]:

@@ -42,7 +42,8 @@ def clip_times(motion: Motion, first: int | None, last: int | None, frame_rate: 
     if not 0 < frame_rate < math.inf:
         raise ValueError(f"frame_rate: want pictures a second above 0, got {frame_rate}")
     step = motion.frame_rate / frame_rate
-    return start + step * np.arange(int((end - start) / step + 1e-6) + 1), frame_rate
+    times: Floats = start + step * np.arange(int((end - start) / step + 1e-6) + 1, dtype=np.float64)
+    return times, frame_rate
 
 
 def clip_markers(puppet: Puppet, motion: Motion, times: ArrayLike) -> Floats:
@@ -78,7 +79,8 @@ def continued(puppet: Puppet, markers: Floats, before: Floats) -> Floats:
     root = int(np.flatnonzero(puppet.parents < 0)[0])
     move = before[-1, root] - turned[0, root]
     move[1] = floors[1] - floors[0]
-    return turned + move
+    moved: Floats = turned + move
+    return moved
 
 
 def marker_names(motion: Motion) -> Sequence[str]:

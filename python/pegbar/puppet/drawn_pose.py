@@ -89,7 +89,7 @@ def _partners(puppet: Puppet) -> NDArray[np.intp]:
     found = []
     for index, pair in enumerate(markers):
         other = tuple(marker and _other_side(marker) for marker in pair)
-        found.append(markers.index(other) if other in markers else index)  # type: ignore[arg-type]
+        found.append(markers.index(other) if other in markers else index)
     return np.array(found, np.intp)
 
 

@@ -72,7 +72,8 @@ def layer_limbs(limbs: Sequence[DrawnLimb], view: View) -> tuple[list[DrawnLimb]
     if view in ("half profile", "side", "half back"):
         arms = [limb for limb in limbs if limb.kind == "arm"]
         legs = [limb for limb in limbs if limb.kind == "leg"]
-        apart = [*arms, *legs[1:]]
+        # The near leg goes with the body, but not where it comes out from under a coat, which it would tear.
+        apart = [*arms, *(leg for leg in legs if leg.covered or leg is not legs[0])]
         own = [limb for limb in limbs if limb in apart or (limb in own and limb.kind == "")]
         # The nearest of several arms lie before the body, the farther half behind; legs that have a layer lie behind.
         before = arms[: (len(arms) + 1) // 2] + [limb for limb in own if limb.kind == "" and limb.depth < 0]

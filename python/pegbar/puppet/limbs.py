@@ -15,9 +15,11 @@ from pegbar.scene.puppet_input import PuppetInput
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-#: From so far along its first bone on, and so many half widths from where it hangs, a limb that touches another part of
-#: the figure is drawn beside or over it; nearer to the trunk they belong together.
-APART_FROM, APART_RADII = 0.6, 1.3
+#: A limb that touches another part of the figure beyond its first bone is drawn beside or over it; nearer to the trunk
+#: they belong together (an upper arm and a sleeve, a thigh and a skirt). A limb of one bone: from here along it.
+APART_FROM = 0.6
+#: A limb that is drawn only from here along its first bone on comes out from under something.
+COVERED_TO = 0.2
 #: A limb's touch that is shorter than so many of its half widths is no touch.
 LEAST_TOUCH = 0.8
 _KINDS = {"shoulder": "arm", "elbow": "arm", "hand": "arm", "hip": "leg", "knee": "leg", "foot": "leg"}
@@ -28,7 +30,8 @@ class DrawnLimb:
     """A limb: its ``bones`` from the trunk outwards, the joint ``root`` by which it hangs, and what ``kind`` it is.
 
     ``kind`` is "arm" or "leg" by what moves it, "" for others. ``depth`` is how much farther away than the trunk it is,
-    in metres; ``beside`` whether it is drawn over or along another part, and ``hidden`` whether one of its joints is.
+    in metres; ``beside`` whether it is drawn over or along another part, ``hidden`` whether one of its joints is, and
+    ``covered`` whether what is drawn of it begins well beyond its first joint: under a coat or skirt.
     """
 
     name: str
@@ -38,6 +41,7 @@ class DrawnLimb:
     depth: float
     beside: bool
     hidden: bool
+    covered: bool = False
 
 
 def drawn_limbs(source: PuppetInput, parts: Parts, seen: SeenPose) -> list[DrawnLimb]:
@@ -60,6 +64,7 @@ def drawn_limbs(source: PuppetInput, parts: Parts, seen: SeenPose) -> list[Drawn
                 depth=float(depths[[root, *ends]].mean() - depths[trunk].mean()),
                 beside=_is_beside(source, parts, chain, chains if kind == "leg" else None),
                 hidden=not bool(source.visible[ends].all()),
+                covered=_is_covered(source, parts, chain[0]),
             )
         )
     return sorted(limbs, key=lambda limb: limb.depth)
@@ -71,6 +76,15 @@ def _name(root: str, first: str, kind: str) -> str:
     if side in ("left", "right") and joint in ("shoulder", "hip"):
         return f"{side} {kind}"
     return (root if kind else first).replace("_", " ")
+
+
+def _is_covered(source: PuppetInput, parts: Parts, bone: int) -> bool:
+    """Whether a limb's first bone is drawn from well beyond its beginning on."""
+    places = np.argwhere(parts.bones == bone + 1)[:, ::-1].astype(np.float64)
+    if not len(places):
+        return True
+    fractions = bone_distances(places, source.marks[source.bones[[bone]]])[1]
+    return bool(np.percentile(fractions, 2) > COVERED_TO)
 
 
 def _is_beside(source: PuppetInput, parts: Parts, chain: list[int], limbs: list[list[int]] | None) -> bool:
@@ -90,6 +104,5 @@ def _is_beside(source: PuppetInput, parts: Parts, chain: list[int], limbs: list[
     distances, fractions = bone_distances(places, ends)
     nearest = distances.argmin(axis=1)
     along = nearest + np.take_along_axis(fractions, nearest[:, None], axis=1)[:, 0]
-    far = np.linalg.norm(places - ends[0, 0], axis=1) > APART_RADII * parts.radii[chain[0]]
-    from_there = APART_FROM if limbs is None else 1.0
-    return bool(((along > from_there) & far).sum() > LEAST_TOUCH * parts.radii[chain].mean() + 2)
+    apart = along > (1.0 if len(chain) > 1 else APART_FROM)
+    return bool(apart.sum() > LEAST_TOUCH * parts.radii[chain].mean() + 2)

@@ -14,12 +14,14 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from pegbar.puppet.alpha import Matting, figure_alpha
 from pegbar.puppet.check import Pieces, checked
 from pegbar.puppet.inpaint import Completion, Method, complete
 from pegbar.puppet.layers import LayerPlan, cut_layers, plan_layers
 from pegbar.puppet.limbs import drawn_limbs
 from pegbar.puppet.mesh import layered_mesh, mesh_spacing
 from pegbar.puppet.parts import Parts, grow_parts
+from pegbar.puppet.silhouette import find_silhouette
 from pegbar.puppet.texture import layer_textures
 from pegbar.puppet.view import SeenPose, View, seen_pose
 from pegbar.scene.drawn_skeleton import limb_chains
@@ -52,6 +54,7 @@ def make_puppet(
     completion: Method | Completion = "auto",
     background: bool = False,
     pieces: Pieces = "join",
+    matting: Matting = "auto",
 ) -> Puppet:
     """Make a puppet of the figure in a picture: camera and pose from a clip, layers, mesh, textures.
 
@@ -76,6 +79,9 @@ def make_puppet(
         picture is transparent round it.
     pieces : {"join", "drop"}
         What is done with pieces of the mask that no bone runs through.
+    matting : {"auto", "closed form", "guided", "mask"}
+        How soft edges are found: see `pegbar.puppet.alpha.figure_alpha`. "auto" is "mask" where a mask is given or the
+        figure is drawn on paper.
 
     Returns
     -------
@@ -86,21 +92,32 @@ def make_puppet(
     ValueError
         For a wrong option, joints outside the mask, or a clip that moves too few of the joints.
     """
-    figure = prepare_figure(source, pieces=pieces)
+    figure = prepare_figure(source, view=view, pieces=pieces, matting=matting)
     plan = plan_figure(figure, motion, view=view, layer_order=layer_order, field_of_view=field_of_view)
     return build_puppet(figure, plan, clip=clip, completion=completion, background=background)
 
 
-def prepare_figure(source: PuppetInput, *, pieces: Pieces = "join") -> PuppetInput:
-    """Return the figure with what does not depend on a clip: a mended mask, its coverage, and where its bones are.
+def prepare_figure(
+    source: PuppetInput, *, view: View | None = None, pieces: Pieces = "join", matting: Matting = "auto"
+) -> PuppetInput:
+    """Return the figure with what does not depend on a clip: its mask and coverage, and where its bones are.
 
     Parameters and errors are those of `make_puppet`; a figure that is prepared already is returned as it is.
     """
     if source.bone_map is not None:
         return source
+    image = np.ascontiguousarray(source.image[..., :3])
+    soft = matting != "auto"
+    if source.mask is None:
+        mask, on_paper = find_silhouette(source, view)
+        source = dataclasses.replace(source, mask=mask)
+        soft = soft or not on_paper
     figure = checked(source, pieces=pieces)
-    assert figure.mask is not None
-    parts = grow_parts(figure, figure.mask)
+    whole = figure.mask
+    assert whole is not None
+    if soft:
+        figure = dataclasses.replace(figure, alpha=figure_alpha(image, whole, matting))
+    parts = grow_parts(figure, whole)
     return dataclasses.replace(figure, bone_map=parts.bones, radii=parts.radii)
 
 

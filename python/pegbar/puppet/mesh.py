@@ -9,11 +9,15 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from pegbar.errors import DegenerateError
 from pegbar.puppet.layers import Layer
 from pegbar.puppet.outline import outlines
 from pegbar.puppet.parts import bone_distances
+from pegbar.puppet.triangulation import triangulate
 from pegbar.scene.puppet_input import PuppetInput
 
 Floats = NDArray[np.float64]
@@ -23,6 +27,13 @@ Flags = NDArray[np.bool_]
 FEWEST, MOST = 700, 2400
 #: How near to a corner of the mesh, in parts of the spacing, no further one is put.
 _NEAR = 0.55
+#: How near, in parts of the spacing, vertices along different bones may be, and how near in pixels joints are one.
+_LEAST, _SAME = 0.25, 0.5
+#: How far from the outline a vertex inside is at least, in pixels.
+_CLEAR = 0.3
+#: How far a region is grown, so that its soft border is on the mesh, and how simple its outline is made: the later ones
+#: are for regions whose simplified outline crosses itself.
+_ATTEMPTS = ((1, 1.0), (1, 0.5), (2, 1.0), (3, 0.5), (2, 0.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,26 +96,45 @@ class _Builder:
         self.shared: dict[int, list[int]] = {index: [] for index in range(len(layers))}
 
     def add(self, index: int) -> None:
-        """Triangulate one layer."""
+        """Triangulate one layer: as simplified as its outline allows without crossing itself."""
         layer = self.layers[index]
-        region = cv2.dilate(layer.region.view(np.uint8), np.ones((3, 3), np.uint8)).astype(bool)
-        outer, holes = outlines(region, self.spacing)
-        corners = [self._new(polygon) for polygon in (*outer, *holes)]
-        inside = self.shared[index] + self._bone_vertices(layer)
-        known = np.array([self.points[i] for i in {*inside, *(c for ring in corners for c in ring)}])
-        inner = self._new(_grid(region, self.spacing, known))
-        local = [i for ring in corners for i in ring] + inside + inner
-        local = list(dict.fromkeys(local))
-        places = np.array([self.points[i] for i in local])
-        found = _triangulate(places, outer, holes)
-        self.triangles.append(np.array(local, np.int64)[found])
-        self.layer_of.append(np.full(len(found), index, np.int64))
-        self._join(layer, [i for ring in corners for i in ring])
+        problem: ValueError | None = None
+        for grown, tolerance in _ATTEMPTS:
+            size = 2 * grown + 1
+            region = cv2.dilate(layer.region.view(np.uint8), np.ones((size, size), np.uint8)).astype(bool)
+            state = len(self.points), len(self.handles), dict(self.joints)
+            try:
+                self._triangulate(index, region, *outlines(region, self.spacing, tolerance=tolerance))
+                return
+            except ValueError as error:
+                problem = error
+                del self.points[state[0] :], self.handles[state[1] :]
+                self.joints = state[2]
+        raise DegenerateError(f"layer {layer.name}: its outline cannot be triangulated: {problem}")
+
+    def _triangulate(self, index: int, region: Flags, outer: list[Floats], holes: list[Floats]) -> None:
+        layer = self.layers[index]
+        if not outer:
+            raise ValueError("it has no outline")
+        corners = [i for ring in (*outer, *holes) for i in self._new(ring)]
+        known = np.array([self.points[i] for i in corners])
+        within = [i for i in self.shared[index] if _is_inside(self.points[i], outer, holes)]
+        inside = list(dict.fromkeys(within + self._bone_vertices(layer, outer, holes)))
+        known = np.concatenate([known, np.array([self.points[i] for i in inside]).reshape(-1, 2)])
+        grid = _grid(region, self.spacing, known)
+        inner = self._new(np.array([place for place in grid if _is_inside(place, outer, holes)]).reshape(-1, 2))
+        local = [*corners, *inside, *inner]
+        places = np.array([self.points[i] for i in (*inside, *inner)]).reshape(-1, 2)
+        found = triangulate(outer, holes=holes, points=places, split_edges=False)
+        self.triangles.append(np.array(local, np.int64)[found.triangles])
+        self.layer_of.append(np.full(len(found.triangles), index, np.int64))
+        self._join(layer, corners)
 
     def finish(self, bones: NDArray[np.uint8]) -> LayeredMesh:
         """The mesh, without vertices that no triangle has."""
         vertices, triangles = np.array(self.points), np.concatenate(self.triangles)
-        layer_of = np.concatenate(self.layer_of)
+        held = self._held(triangles)
+        triangles, layer_of = triangles[held], np.concatenate(self.layer_of)[held]
         used, compact = np.unique(triangles, return_inverse=True)
         place = np.full(len(vertices), -1, np.int64)
         place[used] = np.arange(len(used))
@@ -126,6 +156,13 @@ class _Builder:
             boundary=boundary,
         )
 
+    def _held(self, triangles: Ints) -> Flags:
+        """Which triangles hang together with a handle; others could not be placed."""
+        links = (np.ones(2 * len(triangles)), (triangles[:, [0, 1]].ravel(), triangles[:, [1, 2]].ravel()))
+        pieces = connected_components(coo_array(links, shape=(len(self.points),) * 2), directed=False)[1]
+        held: Flags = np.isin(pieces[triangles[:, 0]], pieces[[handle[0] for handle in self.handles]])
+        return held
+
     def _all_joints(self) -> range:
         return range(len(self.source.names))
 
@@ -134,17 +171,19 @@ class _Builder:
         self.points.extend(places)
         return list(range(start, len(self.points)))
 
-    def _bone_vertices(self, layer: Layer) -> list[int]:
+    def _bone_vertices(self, layer: Layer, outer: list[Floats], holes: list[Floats]) -> list[int]:
         """The vertices along the layer's bones; those at joints are shared by all layers that meet there."""
         found = []
         for bone in layer.bones:
             ends = [int(joint) for joint in self.source.bones[bone]]
             start, end = self.source.marks[ends]
             parts = max(1, round(float(np.linalg.norm(end - start)) / self.spacing))
-            found += [self._joint_vertex(joint, bone) for joint in ends]
+            joints = [joint for joint in ends if _is_inside(self.source.marks[joint], outer, holes)]
+            found += [self._joint_vertex(joint, bone) for joint in joints]
             for step in range(1, parts):
                 place = start + step / parts * (end - start)
-                if _holds(layer.region, place):
+                apart = min((math.dist(place, self.points[i]) for i in found), default=math.inf)
+                if apart > _LEAST * self.spacing and _is_inside(place, outer, holes):
                     found += (vertex := self._new(place[None]))
                     self.handles.append((vertex[0], bone, step / parts))
         return found
@@ -153,7 +192,7 @@ class _Builder:
         """The vertex at a joint, new where there is none; its handle is at the end of the bone that leads to it."""
         if joint not in self.joints:
             place = self.source.marks[joint]
-            twin = next((j for j in self.joints if np.linalg.norm(self.source.marks[j] - place) < 1e-3), None)
+            twin = next((j for j in self.joints if np.linalg.norm(self.source.marks[j] - place) < _SAME), None)
             self.joints[joint] = self._new(place[None])[0] if twin is None else self.joints[twin]
             if twin is None:
                 leading = np.flatnonzero(self.source.bones[:, 1] == joint)
@@ -200,22 +239,15 @@ def _grid(region: Flags, spacing: float, known: Floats) -> Floats:
     return kept
 
 
+def _is_inside(place: Floats, outer: Sequence[Floats], holes: Sequence[Floats]) -> bool:
+    """Whether a place lies inside an outline and outside the holes, and not on one of them."""
+
+    def deep(ring: Floats) -> float:
+        return float(cv2.pointPolygonTest(ring.astype(np.float32), (float(place[0]), float(place[1])), True))
+
+    return any(deep(ring) > _CLEAR for ring in outer) and all(deep(ring) < -_CLEAR for ring in holes)
+
+
 def _holds(region: Flags, place: Floats) -> bool:
     x, y = round(float(place[0])), round(float(place[1]))
     return 0 <= y < region.shape[0] and 0 <= x < region.shape[1] and bool(region[y, x])
-
-
-def _triangulate(points: Floats, outer: Sequence[Floats], holes: Sequence[Floats]) -> Ints:
-    from scipy.spatial import Delaunay
-
-    found = Delaunay(points).simplices.astype(np.int64)
-    centres = points[found].mean(axis=1)
-
-    def within(rings: Sequence[Floats]) -> Flags:
-        return np.array(
-            [any(cv2.pointPolygonTest(r.astype(np.float32), tuple(c), False) > 0 for r in rings) for c in centres]
-        )
-
-    a, b, c = (points[found[:, k]] for k in range(3))
-    area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    return found[within(outer) & ~within(holes) & (np.abs(area) > 1e-6)]

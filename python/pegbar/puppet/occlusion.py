@@ -67,6 +67,7 @@ def piece_ranks(pieces: Pieces, bones: Ints, camera: PerspectiveCamera, poses: F
     first, second = np.triu_indices(count, 1)
     known = (pieces.bones[first] >= 0) & (pieces.bones[second] >= 0)
     known &= pieces.bones[first] != pieces.bones[second]
+    known &= ~_hanging(pieces, bones)[first, second]
     behind, cover = _crossings(pieces, bones, pixels, depths, first[known], second[known])
     drawn = _drawn_in_front(pieces, bones)[first, second]
     front = np.broadcast_to(drawn, (len(poses), len(first))).copy()
@@ -133,6 +134,23 @@ def nearest_points(start: Floats, along: Floats, other: Floats, across: Floats) 
     share = np.clip((ab * partner - ag) / aa, 0, 1)
     apart = gap + share[..., None] * along - partner[..., None] * across
     return share, partner, np.linalg.norm(apart, axis=-1)
+
+
+def _hanging(pieces: Pieces, bones: Ints) -> Flags:
+    """Whether one of two pieces (P, P) is where a limb hangs on the other's layer.
+
+    There limbs reach under what they come out from (a thigh under a coat), or over it: that stays as drawn.
+    """
+    leads_to = {int(child): bone for bone, child in enumerate(bones[:, 1])}
+    hangs = np.zeros((len(pieces.bones),) * 2, bool)
+    for piece, (bone, layer) in enumerate(zip(pieces.bones, pieces.layers, strict=True)):
+        above = leads_to.get(int(bones[bone, 0])) if bone >= 0 else None
+        if above is None:
+            continue
+        held_by = pieces.layers[pieces.bones == above]
+        if len(held_by) and layer not in held_by:
+            hangs[piece] = np.isin(pieces.layers, held_by)
+    return hangs | hangs.T
 
 
 def _drawn_in_front(pieces: Pieces, bones: Ints) -> Flags:

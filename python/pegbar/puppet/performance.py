@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 import dataclasses
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,7 +67,7 @@ class Direction:
     transition: float = 0.0
     between: float = 0.3
     loop: bool = False
-    inflation: float = 1.0
+    inflation: float = 0.5
     shapes: str = "asap"
 
 
@@ -193,25 +193,26 @@ def _joined(
     """Poses (F, J, 3) over the drawn place, the way (F, 3) from there, the rate, and notes, of clips in a row."""
     if not motions:
         raise ValueError("motion: want at least one clip")
+    if len(motions) > 1 and (direction.first, direction.last) != (None, None):
+        raise ValueError("frames: want a range for one clip only, got several clips")
     reference = clip_markers(puppet, motions[0], [puppet.pose_frame])[0]
     scale, root = body_scale(puppet, rest, reference), root_joint(puppet)
-    rate, before = direction.frame_rate, None
-    poses, ways, notes = [], [], []
-    for number, motion in enumerate(motions):
-        alone = direction if len(motions) == 1 else dataclasses.replace(direction, first=None, last=None)
-        times, rate = clip_times(motion, alone.first, alone.last, rate)
+    rate = clip_times(motions[0], direction.first, direction.last, direction.frame_rate)[1]
+    poses: list[Floats] = []
+    ways: list[Floats] = []
+    notes: list[str] = []
+    before: Floats | None = None
+    for motion in motions:
+        times, _ = clip_times(motion, direction.first, direction.last, rate)
         markers = clip_markers(puppet, motion, times)
-        if before is not None:
-            markers = continued(puppet, markers, before)
+        markers = markers if before is None else continued(puppet, markers, before)
         notes += _turned_notes(puppet, markers, reference, times)
-        own = ground_poses(
-            retarget(puppet, rest, markers, reference, keep=direction.keep), markers, rest, reference, scale
-        )
+        own = retarget(puppet, rest, markers, reference, keep=direction.keep)
+        own = ground_poses(own, markers, rest, reference, scale)
         way = horizontal_path(markers[:, root], reference[root], scale, direction.travel)
         if before is not None:
-            count = round(direction.between * rate)
             way = way - way[0] + ways[-1][-1]
-            poses.append(_between(puppet, poses[-1][-1], own[0], count)[1:])
+            poses.append(_between(puppet, poses[-1][-1], own[0], round(direction.between * rate))[1:])
             ways.append(np.repeat(way[:1], len(poses[-1]), axis=0))
         poses.append(own)
         ways.append(way)

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from pegbar import _kernels
 from pegbar.puppet.drawn_pose import focal_lengths
 from pegbar.puppet.figure_picture import FigurePicture
 from pegbar.puppet.performance import Performance
@@ -108,22 +109,26 @@ class Stage:
         """
         figures = [FigurePicture.of_puppet(performance.puppet) for performance in self.performances]
         for frame in range(start, len(self) if stop is None else stop):
-            canvas = self._ground(frame)
+            ground = self._ground(frame)
+            canvas: Pixels | None = None
             for index, performance in enumerate(self.performances):
                 own = frame % len(performance)
                 mesh = performance.meshes[own] * self.scales[index] + self.offsets[index]
                 drawn = figures[index].draw(mesh, performance.triangle_depths(own), self.size)
-                canvas = drawn if canvas is None else put_over(drawn, canvas)
-            assert canvas is not None
-            yield canvas
+                if ground is not None:
+                    ground = _kernels.over_ground(drawn, ground)
+                else:
+                    canvas = drawn if canvas is None else put_over(drawn, canvas)
+            finished = ground if ground is not None else canvas
+            assert finished is not None
+            yield finished
 
     def _ground(self, frame: int) -> Pixels | None:
-        """What is behind the figures in a picture of its own, or None for nothing."""
-        width, height = self.size
+        """What is behind the figures (H, W, 3), one pixel (1, 1, 3) for one colour, or None for nothing."""
         if self.setting.background == "transparent":
             return None
         if self.behind is None:
-            return np.full((height, width, 3), self.setting.color, np.uint8)
+            return np.array([[self.setting.color]], np.uint8)
         first = self.performances[0]
         scale, shift = self.scales[0], first.shift[frame % len(first)]
         move = np.array([[scale, 0, 0], [0, scale, 0]])
@@ -136,17 +141,13 @@ class Stage:
 
 
 def put_over(drawn: Pixels, ground: Pixels) -> Pixels:
-    """Return ``drawn`` (H, W, 4), straight alpha, over ``ground`` (H, W, 3|4): its pixels change only where needed."""
+    """Put ``drawn`` (H, W, 4) over ``ground`` (H, W, 4), both with straight alpha, in place."""
     rows, columns = np.flatnonzero(drawn[..., 3].any(axis=1)), np.flatnonzero(drawn[..., 3].any(axis=0))
     if not len(rows):
         return ground
     part = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
     upper, lower = drawn[part], ground[part]
     alpha = upper[..., 3:].astype(np.uint16)
-    if ground.shape[2] == 3:
-        mixed = upper[..., :3] * alpha + lower * (255 - alpha)
-        lower[...] = (mixed + 127) // 255
-        return ground
     under = lower[..., 3:].astype(np.uint16) * (255 - alpha) // 255
     total = alpha + under
     mixed = upper[..., :3].astype(np.uint32) * alpha + lower[..., :3].astype(np.uint32) * under

@@ -22,8 +22,8 @@ Floats = NDArray[np.float64]
 View = Literal["front", "half profile", "side", "half back", "back"]
 #: Azimuths between camera and facing up to which a view reaches: templates stand 45 degrees apart (figure 3).
 _REACH = (22.5, 67.5, 112.5, 157.5, 180.0)
-#: Poses that are tried: 500 take a tenth of a second.
-MOST_POSES = 500
+#: Poses that are tried: frames of a clip are alike, and every pose takes its time.
+MOST_POSES = 160
 #: Pictures are drawn from about eye level: a clip that lacks the drawn pose must not tilt the camera to make up for it.
 ELEVATION_SPREAD, ROLL_SPREAD = math.radians(6), math.radians(2)
 #: The RMS error, as part of the marks' extent, beyond which no pose of the clip is the figure's. People drawn in a
@@ -34,6 +34,11 @@ POOR_FIT = 0.1
 _USUAL_FIELD_OF_VIEW = math.radians(40)
 #: Half the distance between the left and right limbs of a figure that is no person, in metres.
 _HALF_WIDTH = 0.1
+
+
+#: Shoulders or hips that are farther apart than these parts of the trunk's length are seen from the front, or in half
+#: profile.
+_FRONT, _HALF = 0.45, 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +67,19 @@ def view_of(azimuth: float) -> View:
     return next(name for name, reach in zip(names, _REACH, strict=True) if turned <= reach)
 
 
+def drawn_view(source: PuppetInput) -> View:
+    """The view that the drawing itself tells: by how far shoulders and hips are apart, and which is on which side."""
+    places = dict(zip(source.names, source.marks, strict=True))
+    trunk = max(float(np.linalg.norm(places["neck"] - places["pelvis"])), 1e-9)
+    pairs = [(f"left_{joint}", f"right_{joint}") for joint in ("shoulder", "hip")]
+    across = [places[left] - places[right] for left, right in pairs if left in places and right in places]
+    wide = max((float(np.linalg.norm(apart)) / trunk for apart in across), default=1.0)
+    behind = bool(across) and sum(float(apart[0]) for apart in across) < 0
+    if wide > _FRONT:
+        return "back" if behind else "front"
+    return "side" if wide <= _HALF else "half back" if behind else "half profile"
+
+
 def seen_pose(
     source: PuppetInput, motion: Motion, *, view: View | None = None, field_of_view: float | None = None
 ) -> SeenPose:
@@ -72,7 +90,8 @@ def seen_pose(
     source : PuppetInput
     motion : Motion
     view : {"front", "half profile", "side", "half back", "back"}, optional
-        Only poses seen so are taken; where there is none the best pose is, under the wanted name.
+        Only poses seen so are taken; where there is none the best pose is, under the wanted name. None is the camera's
+        for a clip that has the drawn pose, else what the drawing tells (`drawn_view`).
     field_of_view : float, optional
         Horizontal, radians; None finds one near the usual.
 
@@ -98,9 +117,10 @@ def seen_pose(
         )
     except DegenerateError:
         fit = None
-    if fit is None or fit.error > NO_FIT * extent:
+    if fit is None or fit.error > NO_FIT * extent or _is_animal(source):
         return _as_drawn(source, motion, poses, view, field_of_view)
-    choice, azimuth, found = _choice(fit, points, towards, view)
+    poor = fit.error > POOR_FIT * extent
+    choice, azimuth, found = _choice(fit, points, towards, view or (drawn_view(source) if poor else None))
     camera, error = fit.cameras[choice], float(fit.errors[choice])
     assert camera is not None
     frame = int(frames[choice])
@@ -109,6 +129,12 @@ def seen_pose(
         notes = (f"no pose of the clip is like the drawn one: the best, frame {frame}, is off by {error:.0f} px",)
     pose = _completed(source, moved, points[choice], camera)
     return SeenPose(camera, frame, pose, True, azimuth, found, error, notes)
+
+
+def _is_animal(source: PuppetInput) -> bool:
+    """Whether a figure lies and has other limbs than a person."""
+    trunk = source.marks[source.names.index("neck")] - source.marks[source.names.index("pelvis")]
+    return bool(abs(trunk[0]) > abs(trunk[1])) and any(name != marker for name, marker in source.drives.items())
 
 
 def _poses(source: PuppetInput, motion: Motion) -> tuple[list[int], Floats, NDArray[np.intp]]:

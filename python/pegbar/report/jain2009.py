@@ -56,6 +56,8 @@ METRES_PER_PIXEL = 1.7 / 500
 CYCLE = 34
 #: The ways to lift: closed form, rigid limbs of unknown length, rigid limbs of known length.
 WAYS = ("closed form", "refine", "refine, lengths given")
+#: Metres: a limb that is less deep lies in the picture plane.
+FLAT = 0.05
 #: The paper's table 1: mean and largest error in metres for each offset, and for the clip alone.
 PRINTED = {
     (0, 0): (0.0045, 0.0173),
@@ -94,6 +96,35 @@ class Lifted:
         distances = np.linalg.norm(self.ways[way] - self.truth, axis=-1)
         frame, marker = np.unravel_index(np.argmax(distances), distances.shape)
         return float(distances[frame, marker]), int(frame), MARKERS[int(marker)]
+
+
+@dataclass(frozen=True)
+class Culprit:
+    """The limb that errs most, by its outer marker, and the frames in which it points the wrong way in depth.
+
+    ``error`` (m) is the root mean square of the outer marker's, as seen from the inner one; ``wrong`` counts frames of
+    the lifted limb, ``clip_wrong`` of the clip's.
+    """
+
+    marker: str
+    error: float
+    wrong: int
+    clip_wrong: int
+
+
+def culprit(lifted: Lifted, way: str, angles: tuple[float, float]) -> Culprit:
+    """Return where ``way`` errs most of a figure seen from ``angles`` (azimuth, elevation in degrees), and why."""
+    away = OrthographicCamera.from_angles(*angles).rotation[2]
+    found, clip, truth = (
+        one[:, LIMBS[:, 1]] - one[:, LIMBS[:, 0]] for one in (lifted.ways[way], lifted.clip, lifted.truth)
+    )
+    errors = np.sqrt(np.mean(np.sum((found - truth) ** 2, axis=-1), axis=0))
+    limb = int(np.argmax(errors))
+    depth, own, clips = (one[:, limb] @ away for one in (truth, found, clip))
+    # A limb that lies in the picture plane has no sign.
+    signed = np.abs(depth) > FLAT
+    wrong, clip_wrong = (int(np.sum((one * depth < 0) & signed)) for one in (own, clips))
+    return Culprit(MARKERS[LIMBS[limb, 1]], float(errors[limb]), wrong, clip_wrong)
 
 
 @dataclass(frozen=True)

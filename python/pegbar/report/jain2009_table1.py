@@ -23,6 +23,7 @@ from pegbar.report.jain2009 import (
     Lifted,
     Result,
     coordinate_errors,
+    culprit,
     table1,
 )
 
@@ -101,12 +102,24 @@ def _mean(lifted: list[Lifted], way: str, markers: slice) -> float:
 
 
 def worst(result: Result) -> list[str]:
-    """Return where each way errs most, three-quarter view, exact marks."""
+    """Return where each way errs most, three-quarter view, exact marks; and where rigid limbs do from every view."""
     lines = ["Largest error, camera as it is:"]
     for pair in PAIRS:
         for way in WAYS:
             distance, frame, marker = result.offsets[pair][0, 0].worst(way)
             lines.append(f"  {pair[0]} with {pair[1]}, {way}: {distance:.3f} m, {marker}, frame {frame}")
+    lines += [
+        "",
+        "Limb that errs most with refine (outer marker, root mean square), and frames with its depth's sign wrong:",
+    ]
+    for view, angles in VIEWS.items():
+        for noise in NOISES[:2]:
+            for pair in PAIRS:
+                found = culprit(result.views[pair][view, noise], WAYS[1], angles)
+                lines.append(
+                    f"  {view}, {noise} px, {pair[0]} with {pair[1]}: {found.marker} {found.error:.3f} m, wrong in "
+                    f"{found.wrong} frames, the clip in {found.clip_wrong}"
+                )
     return lines
 
 

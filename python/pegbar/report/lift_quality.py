@@ -16,6 +16,8 @@ Floats = NDArray[np.float64]
 RIGID = 0.08
 #: Marks this many pixels from the skeleton are told, and this share of the figure's height.
 _FAR = 0.05
+#: Metres: a clip whose poses differ less has no movement.
+_STILL = 0.02
 
 
 def quality(alignment: Alignment, lifted: Lifted, numbers: Sequence[int]) -> dict[str, Any]:
@@ -71,6 +73,9 @@ def notes(
     found = []
     if lost := [name for name in alignment.names if name not in lifted.names]:
         found.append(f"the clip has no joint for {', '.join(lost)}: left out")
+    poses = alignment.clip - np.nanmean(alignment.clip, axis=1, keepdims=True)
+    if float(np.nanmax(np.ptp(poses, axis=0))) < _STILL:
+        found.append("the clip stands still: all depth is that of one pose, and no foot is known to leave the ground")
     loose = {name: change for name, change in values["limb_length_residuals"].items() if change > RIGID}
     if loose and not stretch:
         most = sorted(loose, key=lambda name: -loose[name])[:3]
@@ -84,7 +89,7 @@ def notes(
         found.append(
             f"the skeleton is {values['skeleton_reprojection_px']:.0f} px from the drawn marks "
             f"({values['skeleton_reprojection_px'] / height:.0%} of the figure's height), most at {worst['joint']} in "
-            f"drawing {worst['drawing']}: its limbs are not as long as the drawn ones"
+            f"drawing {worst['drawing']}"
         )
     return found
 

@@ -19,7 +19,8 @@ class Driving:
 
     ``markers`` (D, N, 2) in pixels are guessed where ``estimated`` (D, N); ``positions`` (D, N, 3) world metres, y up,
     project onto them under ``matrices`` (D, 3, 4). ``boxes``, ``given``, ``repaired`` and ``measured`` are those of
-    `LimbBoxes`; ``ground`` is the floor's height or None; ``notes`` say what a user should know.
+    `LimbBoxes`; ``ground`` is the floor's height or None; ``overlaps`` (D, 2) is how deep volumes of limbs that are not
+    joined run into each other, before and after they were moved apart; ``notes`` say what a user should know.
     """
 
     numbers: tuple[int, ...]
@@ -37,4 +38,5 @@ class Driving:
     measured: Floats
     volumes: TaperedCylinders
     ground: float | None
+    overlaps: Floats
     notes: tuple[str, ...] = ()

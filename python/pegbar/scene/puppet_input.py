@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +20,11 @@ class PuppetInput:
     ``names`` are its J joints, ``marks`` (J, 2) their pixels (NaN where a joint is not marked) and ``visible`` (J,)
     whether they are seen. ``bones`` (B, 2) int are pairs of joints, parent and child, from the root outwards.
     ``drives`` is joint -> the clip's marker that moves it. ``source`` is what to call the picture in messages,
-    ``photo`` whether its silhouette has soft edges, ``notes`` what a user should know. ``segmentation`` (H, W, 3) uint8
+    ``photo`` whether it is a photo without a mask, ``notes`` what a user should know. ``segmentation`` (H, W, 3) uint8
     is painted in the colours of ``limbs`` where the drawing comes with one. ``alpha`` (H, W) float32 is the figure's
     coverage, 0 to 1, where it is known better than from picture and mask; ``bone_map`` (H, W) uint8 the bone that each
     pixel belongs to, v + 1 for bone v, and ``radii`` (B,) the bones' half widths in pixels, once they are found.
+    ``files`` are what all this was read from.
     """
 
     image: NDArray[np.uint8]
@@ -40,6 +42,7 @@ class PuppetInput:
     alpha: NDArray[np.float32] | None = None
     bone_map: NDArray[np.uint8] | None = None
     radii: NDArray[np.float64] | None = None
+    files: tuple[Path, ...] = ()
 
     @property
     def image_size(self) -> tuple[int, int]:

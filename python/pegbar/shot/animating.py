@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -13,15 +15,17 @@ from numpy.typing import NDArray
 from pegbar.io.film import check_film, write_film
 from pegbar.io.frames import PICTURE_SUFFIXES, read_picture
 from pegbar.io.motion import read_motion
-from pegbar.io.puppet_input import find_joints, read_puppet_input
-from pegbar.puppet.make import make_puppet
+from pegbar.io.puppet_input import find_joints
 from pegbar.puppet.performance import Direction, Performance, perform
 from pegbar.puppet.staging import Setting, Stage
 from pegbar.report.contact_sheet import over_paper
 from pegbar.scene.mirror import mirrored
 from pegbar.scene.motion import Motion
+from pegbar.shot.puppet import PuppetOptions, kept_puppet
 
 Advance = Callable[[int, int], None]
+#: The field of view of drawings, radians: they show less perspective than a photo, whose own is found.
+DRAWN_VIEW = math.radians(20)
 #: Suffixes of clips, for folders.
 CLIP_SUFFIXES = (".bvh", ".amc", ".c3d")
 
@@ -36,21 +40,20 @@ class Casting:
         Files; None: looked for beside the picture.
     drives : dict of str to str
         Joint -> the marker that moves it, where another than found is wanted.
-    view : str, optional
-    layer_order : tuple of str, optional
-    field_of_view : float, optional
-        Radians.
+    options : PuppetOptions
+        Without a field of view it is `DRAWN_VIEW` for drawings, and found for photos.
     mirror : bool
         Perform the clip's mirror image.
+    keep : Path, optional
+        The folder in which puppets are kept for the next run.
     """
 
     joints: Path | None = None
     mask: Path | None = None
     drives: Mapping[str, str] = field(default_factory=dict)
-    view: str | None = None
-    layer_order: tuple[str, ...] | None = None
-    field_of_view: float | None = None
+    options: PuppetOptions = field(default_factory=PuppetOptions)
     mirror: bool = False
+    keep: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -103,7 +106,7 @@ def animate_parts(
     check_film(output, alpha=alpha)
     start = time.perf_counter()
     performances = [cast(part, casting, direction, setting) for part in parts]
-    picture = over_paper(read_picture(_picture_of(parts[0], casting))) if setting.background == "picture" else None
+    picture = over_paper(read_picture(_picture_of(parts[0]))) if setting.background == "picture" else None
     stage = Stage.of_performances(performances, setting, picture)
     ready = time.perf_counter()
     write_film(output, _told(stage.pictures(), len(stage), progress), performances[0].frame_rate, alpha=alpha)
@@ -112,19 +115,27 @@ def animate_parts(
 
 
 def cast(part: Part, casting: Casting, direction: Direction, setting: Setting) -> Performance:
-    """Make a figure's puppet and let it perform its clips."""
+    """Make a figure's puppet, or take the one that is kept, and let it perform its clips."""
     motions = [_clip(path, casting) for path in part.clips]
-    source = read_puppet_input(part.picture, joints=casting.joints, mask=casting.mask, map=casting.drives)
-    puppet = make_puppet(
-        source,
+    options = dataclasses.replace(casting.options, background=setting.background == "completed")
+    if options.field_of_view is None and not is_photo(part.picture):
+        options = dataclasses.replace(options, field_of_view=DRAWN_VIEW)
+    puppet = kept_puppet(
+        part.picture,
         motions[0],
         clip=part.clips[0].stem,
-        view=casting.view,  # type: ignore[arg-type]
-        layer_order=casting.layer_order,
-        field_of_view=casting.field_of_view,
-        background=setting.background == "completed",
+        joints=casting.joints,
+        mask=casting.mask,
+        map=casting.drives,
+        options=options,
+        keep=casting.keep,
     )
     return perform(puppet, motions, direction)
+
+
+def is_photo(picture: Path) -> bool:
+    """Whether a picture is taken for a photo: a JPEG without a mask beside it."""
+    return picture.suffix.lower() in (".jpg", ".jpeg") and not (picture.parent / "mask.png").is_file()
 
 
 def find_pictures(path: Path) -> list[Path]:
@@ -156,7 +167,7 @@ def _clip(path: Path, casting: Casting) -> Motion:
     return mirrored(motion) if casting.mirror else motion
 
 
-def _picture_of(part: Part, casting: Casting) -> Path:
+def _picture_of(part: Part) -> Path:
     """The picture itself, where the part names the file that marks it."""
     if part.picture.suffix.lower() in PICTURE_SUFFIXES:
         return part.picture

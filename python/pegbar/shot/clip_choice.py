@@ -60,7 +60,7 @@ def choose_clip(
     else:
         path = folder / section.path
         motion = read_clip(section, folder, path)
-        part = Clip.from_motion(path.name, _named_part(motion, section))
+        part = _searched(path.name, _named_part(motion, section))
         found = _search(drawing, [part], holds, frame_rate)
         if section.azimuth is None or section.elevation is None:
             view = _view(_best(found, path.name), section.start)
@@ -80,6 +80,15 @@ def read_clip(section: ClipSection, folder: Path, path: Path) -> Motion:
         frame_rate=section.frame_rate,
         joints=folder / section.joints if section.joints else None,
     )
+
+
+def _searched(name: str, motion: Motion) -> Clip:
+    try:
+        return Clip.from_motion(name, motion)
+    except ValueError as error:
+        raise ValueError(
+            f"clip: {name}: {error}, without which it cannot be compared; clip.joints can name it"
+        ) from None
 
 
 def check_part(motion: Motion, section: ClipSection) -> None:

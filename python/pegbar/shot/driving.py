@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pegbar.errors import DegenerateError
 from pegbar.layer.box_edges import LimbEdges
 from pegbar.layer.boxes import LimbBoxes, limb_boxes
+from pegbar.layer.separate import separate_volumes
 from pegbar.layer.volumes import collision_volumes
 from pegbar.lift.backprojection import camera_rays
 from pegbar.scene.camera import metric
@@ -33,6 +34,7 @@ def drive(
     clip: Floats | None = None,
     ground: float | None = None,
     frame_rate: float = 24.0,
+    separate: bool = False,
 ) -> Driving:
     """Put a drawn character into 3D with volumes that fill its drawn limbs (2010, sections 3.1.3 and 3.2).
 
@@ -50,6 +52,8 @@ def drive(
         Height of the ground in metres; None: where the feet stand, and none where none does.
     frame_rate : float
         Drawings a second.
+    separate : bool
+        Move markers in depth until limbs that are not joined do not run into each other.
 
     Raises
     ------
@@ -63,11 +67,10 @@ def drive(
         raise ValueError("drawing: want cameras and depths")
     matrices = metric(np.stack([camera.matrix for camera in drawing.cameras]))
     markers, depths, estimated = _placed(drawing)
-    centres, rays = camera_rays(markers, matrices)
-    positions = centres[:, None] + depths[..., None] * rays
     if np.mean([camera.rotation[1, 1] for camera in drawing.cameras]) > 0:
         # The world's y points down in the picture: the camera of annotations that know no world.
-        matrices, positions = matrices @ _UPSIDE_DOWN, positions * (1, -1, -1)
+        matrices = matrices @ _UPSIDE_DOWN
+    positions = _on_rays(markers, matrices, depths)
     limbs = drawing.limb_markers.astype(np.int64)
     limb_names = tuple(limb.name for limb in drawing.limbs)
     focal = np.array([camera.focal_length for camera in drawing.cameras])
@@ -75,6 +78,10 @@ def drive(
     scales = np.where(np.isfinite(scales), scales, 1.0)
     found = limb_boxes(edges, markers, limbs, given=drawing.boxes, scales=scales, names=limb_names)
     volumes = _volumes(found, matrices, positions, limbs, numbers, limb_names)
+    apart = separate_volumes(found.boxes, matrices, markers, depths, limbs, drawing.names, measure_only=not separate)
+    if separate:
+        positions = _on_rays(markers, matrices, apart.depths)
+        volumes = collision_volumes(found.boxes, matrices, positions, limbs)
     floor, said = (ground, ()) if ground is not None else _ground(drawing, positions, clip, frame_rate)
     return Driving(
         tuple(numbers),
@@ -92,8 +99,15 @@ def drive(
         found.measured,
         volumes,
         floor,
+        np.stack([apart.before, apart.after], axis=1),
         (*_missing(drawing.names, limb_names, limbs, positions), *_mended(found, numbers, limb_names), *said),
     )
+
+
+def _on_rays(markers: Floats, matrices: Floats, depths: Floats) -> Floats:
+    centres, rays = camera_rays(markers, matrices)
+    positions: Floats = centres[:, None] + depths[..., None] * rays
+    return positions
 
 
 def _placed(drawing: Drawing) -> tuple[Floats, Floats, Flags]:

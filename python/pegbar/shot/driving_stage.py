@@ -37,7 +37,7 @@ from pegbar.shot.model import SecondarySection
 from pegbar.shot.plan import Shot, open_shot
 from pegbar.shot.record import fingerprint, is_up_to_date, write_record
 
-VERSION = 1
+VERSION = 2
 _SHEET, _SHEET_WIDTH = 24, 480
 # Outlines beside coloured limbs belong to them, so many pixels at most.
 _OUTLINE = 4.0
@@ -122,6 +122,7 @@ class DrivingStage:
             clip=self._clip(),
             ground=self.section.ground if isinstance(self.section.ground, float) else None,
             frame_rate=self.bare.settings.shot.frame_rate / self._hold(),
+            separate=self.section.separate,
         )
         self.folder.mkdir(parents=True, exist_ok=True)
         write_driving(self.outputs()[0], driving)

@@ -58,6 +58,8 @@ class Cloth:
         The shape whose lengths and angles the cloth keeps, None: ``vertices``.
     coordinates : (n, 2) float, optional
         Texture coordinates in metres of cloth (across, along) for patterns; None: none.
+    around : float, optional
+        Of a closed sheet the length across after which the coordinates begin anew; None: it is open.
     material, look
         What it is made of and looks like.
     """
@@ -69,6 +71,7 @@ class Cloth:
     seams: Integers = field(default_factory=lambda: np.empty((0, 2), np.int64))
     rest: Floats | None = None
     coordinates: Floats | None = None
+    around: float | None = None
     material: ClothMaterial = field(default_factory=ClothMaterial)
     look: Look = field(default_factory=Look)
 
@@ -91,13 +94,14 @@ class Cloth:
 class Balls:
     """Rigid balls: ``centers`` (n, 3) and ``velocities`` (n, 3) before the first frame, ``radii`` (n,), metres.
 
-    ``colors`` (n, 4) straight linear RGBA are their own colours (None: all have the look's).
+    Without velocities they rest. ``colors`` (n, 4) straight linear RGBA are their own colours (None: all have the
+    look's).
     """
 
     name: str
     centers: Floats
     radii: Floats
-    velocities: Floats | None = None
+    velocities: Floats = field(default_factory=lambda: np.empty((0, 3)))
     colors: NDArray[np.float32] | None = None
     material: RigidMaterial = field(default_factory=RigidMaterial)
     look: Look = field(default_factory=Look)
@@ -106,7 +110,7 @@ class Balls:
         centers = arrays.floats("centers", self.centers, ("n", 3))
         _set(self, "centers", centers)
         _set(self, "radii", _positive("radii", self.radii, (len(centers),)))
-        velocities = np.zeros_like(centers) if self.velocities is None else self.velocities
+        velocities = self.velocities if len(self.velocities) else np.zeros_like(centers)
         _set(self, "velocities", arrays.floats("velocities", velocities, centers.shape))
         if self.colors is not None:
             _set(self, "colors", arrays.floats("colors", self.colors, (len(centers), 4), dtype=np.float32))
@@ -116,13 +120,14 @@ class Balls:
 class Boxes:
     """Rigid boxes: ``centers`` (n, 3), ``sizes`` (n, 3) their edges, ``velocities`` (n, 3), world metres.
 
-    ``colors`` (n, 4) straight linear RGBA are their own colours (None: all have the look's).
+    Without velocities they rest. ``colors`` (n, 4) straight linear RGBA are their own colours (None: all have the
+    look's).
     """
 
     name: str
     centers: Floats
     sizes: Floats
-    velocities: Floats | None = None
+    velocities: Floats = field(default_factory=lambda: np.empty((0, 3)))
     colors: NDArray[np.float32] | None = None
     material: RigidMaterial = field(default_factory=RigidMaterial)
     look: Look = field(default_factory=Look)
@@ -131,7 +136,7 @@ class Boxes:
         centers = arrays.floats("centers", self.centers, ("n", 3))
         _set(self, "centers", centers)
         _set(self, "sizes", _positive("sizes", self.sizes, centers.shape))
-        velocities = np.zeros_like(centers) if self.velocities is None else self.velocities
+        velocities = self.velocities if len(self.velocities) else np.zeros_like(centers)
         _set(self, "velocities", arrays.floats("velocities", velocities, centers.shape))
         if self.colors is not None:
             _set(self, "colors", arrays.floats("colors", self.colors, (len(centers), 4), dtype=np.float32))

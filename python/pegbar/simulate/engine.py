@@ -37,7 +37,7 @@ class Engine(Protocol):
         """
 
 
-def simulate(
+def simulate_scene(
     scene: SimulationScene,
     cache: Cache,
     engines: Sequence[Engine],
@@ -72,7 +72,7 @@ def simulate(
     --------
     >>> from pegbar.simulate.cache import MemoryCache
     >>> empty = SimulationScene(frame_rate=24, frames=2, elements=())
-    >>> simulate(empty, MemoryCache(), engines=[])
+    >>> simulate_scene(empty, MemoryCache(), engines=[])
     """
     for engine, elements in assign(scene, engines):
         there = min((complete_until(cache, element.name) for element in elements), default=0)

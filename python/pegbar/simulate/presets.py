@@ -1,0 +1,105 @@
+"""Presets: elements that a shot file names in a line and tunes by field terms, with sizes taken from the character."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any
+
+from pegbar.simulate.elements import Element
+from pegbar.simulate.scene import Character
+from pegbar.simulate.standing import Clothesline, FloorBalls
+from pegbar.simulate.wearing import Scarves, Skirt
+
+Preset = Scarves | Skirt | Clothesline | FloorBalls
+PRESETS: Mapping[str, type[Preset]] = {
+    "scarves": Scarves,
+    "skirt": Skirt,
+    "clothesline": Clothesline,
+    "balls": FloorBalls,
+}
+
+
+def preset_elements(
+    kind: str,
+    character: Character,
+    *,
+    name: str | None = None,
+    ground: float | None = None,
+    seed: int = 0,
+    **settings: Any,
+) -> tuple[Element, ...]:
+    """Make the elements of a preset for a character.
+
+    Parameters
+    ----------
+    kind : str
+        "scarves", "skirt", "clothesline" or "balls".
+    character : Character
+        Whose sizes are taken and who wears what is worn.
+    name : str, optional
+        Name of the element, or what the names of several begin with; None: ``kind``.
+    ground : float, optional
+        Height of the ground in metres; balls need one.
+    seed : int
+        Makes every choice by chance repeatable.
+    **settings
+        The preset's fields, see its class in ``PRESETS``. Colours may be "#rrggbb" (sRGB).
+
+    Returns
+    -------
+    tuple of Cloth, Balls or Prop
+        For ``SimulationScene.elements``.
+
+    Raises
+    ------
+    ValueError
+        For a preset or field that there is not (the message lists what there is), a value that is out of range, and a
+        character without the markers or limbs that the preset needs.
+
+    Examples
+    --------
+    >>> from pegbar.scene.volumes import TaperedCylinders
+    >>> import numpy as np
+    >>> names = ("pelvis", "neck", "head", "left_hip", "left_knee", "left_foot", "right_foot")
+    >>> heights = np.array([0.95, 1.45, 1.6, 0.9, 0.5, 0.1, 0.1])
+    >>> markers = np.stack([0 * heights, heights, 0 * heights], axis=1)[None]
+    >>> none = TaperedCylinders(np.empty((1, 0, 3)), np.empty((1, 0, 3)), np.empty((1, 0)), np.empty((1, 0)))
+    >>> boy = Character("boy", names, markers, (), none)
+    >>> balls, = preset_elements("balls", boy, ground=0.0, count=5, size=0.1)
+    >>> balls.name, len(balls.radii)
+    ('balls', 5)
+    """
+    if kind not in PRESETS:
+        raise ValueError(f"no preset {kind!r}: there are {', '.join(PRESETS)}")
+    preset = PRESETS[kind]
+    known = [field.name for field in fields(preset)]
+    for field in settings:
+        if field not in known:
+            raise ValueError(f"{kind}: no setting {field!r}: there are {', '.join(known)}")
+    values = {field: _value(kind, field, value) for field, value in settings.items()}
+    return preset(**values).build(name or kind, character, ground, seed)
+
+
+def _value(kind: str, field: str, value: Any) -> Any:
+    """Colours as linear RGBA, lists as tuples."""
+    if field in ("color", "second"):
+        return _color(kind, field, value)
+    if field == "colors":
+        return tuple(_color(kind, field, color) for color in value)
+    return tuple(value) if isinstance(value, list) else value
+
+
+def _color(kind: str, field: str, value: Any) -> tuple[float, ...]:
+    if isinstance(value, str):
+        digits = re.fullmatch(r"#([0-9a-fA-F]{2})([0-9a-fA-F]{2})([0-9a-fA-F]{2})", value)
+        if digits is None:
+            raise ValueError(f"{kind}: {field}: want #rrggbb, got {value!r}")
+        return (*(_linear(int(pair, 16) / 255) for pair in digits.groups()), 1.0)
+    return tuple(value)
+
+
+def _linear(value: float) -> float:
+    """sRGB to linear light."""
+    return value / 12.92 if value <= 0.04045 else float(((value + 0.055) / 1.055) ** 2.4)

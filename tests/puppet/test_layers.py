@@ -1,0 +1,70 @@
+import numpy as np
+import pytest
+
+from pegbar.puppet.layers import cut_layers, plan_layers
+from pegbar.puppet.limbs import drawn_limbs
+from pegbar.puppet.parts import grow_parts
+from pegbar.puppet.view import seen_pose
+from pegbar.scene.body import MARKERS
+from tests.figures import animal, clip, figure
+
+ACROSS = {"left_elbow": (0.27, 1.2, 0.16), "left_hand": (-0.02, 1.1, 0.2)}
+
+
+def cut(source, order=None, view=None):
+    seen = seen_pose(source, clip(), view=view)
+    parts = grow_parts(source, source.mask)
+    limbs = drawn_limbs(source, parts, seen)
+    plan = plan_layers(len(source.bones), limbs, seen.view, order)
+    return plan, cut_layers(source, source.mask, parts, plan), limbs
+
+
+def test_from_the_front_all_is_one_layer():
+    plan, layers, _ = cut(figure())
+    assert plan.names == ("body",)
+    np.testing.assert_array_equal(layers[0].drawn, figure().mask)
+    assert plan.bone_layer.tolist() == [0] * 15
+
+
+@pytest.mark.parametrize(("azimuth", "near", "far"), [(60, "left", "right"), (-60, "right", "left")])
+def test_from_the_side_there_are_four(azimuth, near, far):
+    plan, layers, limbs = cut(figure(azimuth))
+    assert plan.names == (f"{near} arm", "body", f"{far} leg", f"{far} arm")
+    assert [limb.name for limb in limbs][0].startswith(near)
+    assert sum(layer.parent < 0 for layer in layers) == 1
+    for layer in layers:
+        assert not (layer.drawn & ~layer.region).any()
+    shown = np.any([layer.drawn for layer in layers], axis=0)
+    assert (shown != figure(azimuth).mask).mean() < 0.001
+
+
+def test_an_arm_across_the_trunk_has_a_layer_and_the_trunk_goes_on_behind_it():
+    plan, layers, limbs = cut(figure(changes=ACROSS), view="front")
+    assert next(limb for limb in limbs if limb.name == "left arm").beside
+    assert plan.names == ("left arm", "body")
+    arm, body = layers
+    behind = body.region & arm.drawn & ~body.drawn
+    x, y = np.rint(figure(changes=ACROSS).marks[MARKERS.index("left_hand")]).astype(int)
+    assert behind[y, x]
+    # Where the arm hangs both are there, but nothing of the trunk is beyond the figure.
+    assert not (body.region & ~figure(changes=ACROSS).mask).any()
+
+
+def test_a_hidden_arm_lies_behind():
+    source = figure(changes=ACROSS, hidden=("left_elbow", "left_hand"))
+    assert cut(source, view="front")[0].names == ("body", "left arm")
+
+
+def test_layers_can_be_ordered():
+    wanted = ("right arm", "body", "left arm", "right leg")
+    plan, layers, _ = cut(figure(60), wanted)
+    assert plan.names == tuple(layer.name for layer in layers) == wanted
+    with pytest.raises(ValueError, match="layer_order: want left arm, body, right leg, right arm in some order"):
+        cut(figure(60), ("body", "hat"))
+
+
+def test_an_animal_has_a_layer_a_far_leg():
+    plan, _, limbs = cut(animal())
+    assert plan.names[plan.names.index("body") + 1 :] == ("left hip b", "left hip f")
+    assert {limb.kind for limb in limbs} == {"arm", "leg", ""}
+    assert sorted(bone for bones in plan.bones for bone in bones) == list(range(len(animal().bones)))
