@@ -147,7 +147,7 @@ impl Buffer {
         }
         self.colors.resize(rows * width, [0.0; 4]);
         self.painted.clear();
-        self.painted.resize(rows, usize::MAX..0);
+        self.painted.resize(rows, Range { start: usize::MAX, end: 0 });
         self.width = width;
     }
 
