@@ -29,7 +29,9 @@ def test_a_painted_limb_has_its_width_whatever_its_direction(turn, first, second
     middle, half = np.array([100.0, 80.0]), 45 * np.array([np.cos(turn), np.sin(turn)])
     ends = [middle - half, middle + half]
     found = label_edges(limb_picture(ends, first, second), [ends])
-    np.testing.assert_allclose(found.half_widths[0], [[first, first], [second, second]], atol=1.2)
+    # A pixel, and a twentieth of the taper, since edges are drawn to parallel.
+    off = 1.2 + 0.06 * abs(first - second)
+    np.testing.assert_allclose(found.half_widths[0], [[first, first], [second, second]], atol=off)
     assert (found.trust == 1).all()
 
 
