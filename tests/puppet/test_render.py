@@ -162,12 +162,20 @@ print(hashlib.sha256(moved.tobytes() + np.array(pictures).tobytes()).hexdigest()
     ],
 )
 def test_what_the_renderer_refuses(changes, message):
-    arguments = {"vertices": QUAD, "triangles": HALVES, "texture_coordinates": QUAD, "texture": noise(0), "size": (8, 6)}
+    arguments = {
+        "vertices": QUAD,
+        "triangles": HALVES,
+        "texture_coordinates": QUAD,
+        "texture": noise(0),
+        "size": (8, 6),
+    }
     with pytest.raises(ValueError, match=message):
         render_mesh(**{**arguments, **changes})
 
 
 def test_other_memory_orders_give_the_same():
     want = render_mesh(QUAD * 0.7, HALVES, QUAD, noise(3), (8, 6))
-    got = render_mesh(np.asfortranarray(QUAD * 0.7), np.array(HALVES, np.int16), QUAD.tolist(), noise(3).tolist(), (8, 6))
+    got = render_mesh(
+        np.asfortranarray(QUAD * 0.7), np.array(HALVES, np.int16), QUAD.tolist(), noise(3).tolist(), (8, 6)
+    )
     assert np.array_equal(got, want)
