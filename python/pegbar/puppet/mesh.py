@@ -173,7 +173,7 @@ class _Builder:
 
     def _bone_vertices(self, layer: Layer, outer: list[Floats], holes: list[Floats]) -> list[int]:
         """The vertices along the layer's bones; those at joints are shared by all layers that meet there."""
-        found = []
+        found: list[int] = []
         for bone in layer.bones:
             ends = [int(joint) for joint in self.source.bones[bone]]
             start, end = self.source.marks[ends]
