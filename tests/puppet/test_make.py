@@ -68,3 +68,15 @@ def test_a_drawing_from_the_side_has_four_layers_and_the_legs_come_out_from_unde
     puppet = make_puppet(source, motion, completion="flat")
     assert puppet.layers == ("left arm", "body", "left leg", "right leg", "right arm")
     assert puppet.view in ("half profile", "side")
+
+
+def test_limbs_drawn_one_over_the_other_are_the_nearer_ones_and_both_are_whole():
+    source = figure(90)
+    points = source.marks.copy()
+    for side in ("left", "right"):
+        points[source.names.index(f"{side}_hip")] = points[source.names.index("pelvis")]
+    puppet = make_puppet(dataclasses.replace(source, marks=points), clip(), completion="flat")
+    assert puppet.layers[0] == "left arm"
+    whole = [name for name, handle in zip(puppet.names, puppet.joint_handles, strict=True) if handle >= 0]
+    assert set(puppet.names) - set(whole) <= {"left_hip", "right_hip"}
+    Deformer(puppet.vertices, puppet.triangles, puppet.handles)

@@ -134,6 +134,8 @@ def _drawn(source: PuppetInput, mask: Flags, parts: Parts, plan: LayerPlan) -> l
     """The pixels that show each layer; a limb's reach into the body around the joint by which it hangs."""
     drawn = [np.isin(parts.bones, np.array(own) + 1) for own in plan.bones]
     body = plan.names.index(BODY)
+    if source.segmentation is None:
+        _claim(source, parts, plan, drawn)
     for index, (joint, bones) in enumerate(zip(plan.joints, plan.bones, strict=True)):
         held = _capsules(source, bones, np.ones(len(source.bones)), mask)
         pieces = _joined(drawn[index] | held, source, bones)
@@ -151,6 +153,17 @@ def _drawn(source: PuppetInput, mask: Flags, parts: Parts, plan: LayerPlan) -> l
             drawn[index] &= ~within
             drawn[body] |= within
     return drawn
+
+
+def _claim(source: PuppetInput, parts: Parts, plan: LayerPlan, drawn: list[Flags]) -> None:
+    """Give limbs what of farther limbs lies around their own bones, in place: there the nearer one is seen."""
+    limbs = [index for index, joint in enumerate(plan.joints) if joint >= 0]
+    for place, index in enumerate(limbs):
+        own = _capsules(source, plan.bones[index], _SLIM * parts.radii, np.ones(drawn[index].shape, bool))
+        for farther in limbs[place + 1 :]:
+            taken = drawn[farther] & own
+            drawn[index] |= taken
+            drawn[farther] &= ~taken
 
 
 def _expected(source: PuppetInput, parts: Parts, bones: tuple[int, ...]) -> Flags:

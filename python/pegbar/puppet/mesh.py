@@ -119,7 +119,7 @@ class _Builder:
         corners = [i for ring in (*outer, *holes) for i in self._new(ring)]
         known = np.array([self.points[i] for i in corners])
         within = [i for i in self.shared[index] if _is_inside(self.points[i], outer, holes)]
-        inside = list(dict.fromkeys(within + self._bone_vertices(layer, outer, holes)))
+        inside = self._apart([*self._bone_vertices(layer, outer, holes), *within])
         known = np.concatenate([known, np.array([self.points[i] for i in inside]).reshape(-1, 2)])
         grid = _grid(region, self.spacing, known)
         inner = self._new(np.array([place for place in grid if _is_inside(place, outer, holes)]).reshape(-1, 2))
@@ -173,13 +173,14 @@ class _Builder:
 
     def _bone_vertices(self, layer: Layer, outer: list[Floats], holes: list[Floats]) -> list[int]:
         """The vertices along the layer's bones; those at joints are shared by all layers that meet there."""
-        found = []
+        found: list[int] = []
         for bone in layer.bones:
             ends = [int(joint) for joint in self.source.bones[bone]]
             start, end = self.source.marks[ends]
             parts = max(1, round(float(np.linalg.norm(end - start)) / self.spacing))
             joints = [joint for joint in ends if _is_inside(self.source.marks[joint], outer, holes)]
-            found += [self._joint_vertex(joint, bone) for joint in joints]
+            for joint in joints:
+                found.append(self._joint_vertex(joint, bone, found))
             for step in range(1, parts):
                 place = start + step / parts * (end - start)
                 apart = min((math.dist(place, self.points[i]) for i in found), default=math.inf)
@@ -188,17 +189,31 @@ class _Builder:
                     self.handles.append((vertex[0], bone, step / parts))
         return found
 
-    def _joint_vertex(self, joint: int, bone: int) -> int:
-        """The vertex at a joint, new where there is none; its handle is at the end of the bone that leads to it."""
+    def _apart(self, vertices: list[int]) -> list[int]:
+        """The vertices, each once, without those at an earlier one's place (of limbs drawn one over the other)."""
+        kept: list[int] = []
+        for vertex in dict.fromkeys(vertices):
+            if all(math.dist(self.points[vertex], self.points[other]) > _SAME for other in kept):
+                kept.append(vertex)
+        return kept
+
+    def _joint_vertex(self, joint: int, bone: int, found: Sequence[int]) -> int:
+        """The vertex at a joint, new where there is none; its handle is at the end of the bone that leads to it.
+
+        Joints at one place share the vertex if it is among those ``found`` on the layer already.
+        """
         if joint not in self.joints:
             place = self.source.marks[joint]
-            twin = next((j for j in self.joints if np.linalg.norm(self.source.marks[j] - place) < _SAME), None)
+            twin = next((j for j in self.joints if self._is_twin(j, place, found)), None)
             self.joints[joint] = self._new(place[None])[0] if twin is None else self.joints[twin]
             if twin is None:
                 leading = np.flatnonzero(self.source.bones[:, 1] == joint)
                 handle = (self.joints[joint], int(leading[0]), 1.0) if len(leading) else (self.joints[joint], bone, 0.0)
                 self.handles.append(handle)
         return self.joints[joint]
+
+    def _is_twin(self, joint: int, place: Floats, found: Sequence[int]) -> bool:
+        return self.joints[joint] in found and math.dist(self.source.marks[joint], place) < _SAME
 
     def _join(self, layer: Layer, outline: Sequence[int]) -> None:
         """Note which vertices of a layer's outline are on its parent too: those behind the joint that it hangs by."""
