@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from pegbar import DegenerateError, OrthographicCamera, find_orthographic, read_motion
 from pegbar.report.jain2009 import LIMBS as WALK_LIMBS
 from pegbar.report.jain2009 import MARKERS, walk_poses
-from tests.figures import LIMBS, swinging
+from tests.limbs import LIMBS, swinging
 
 ARMS_AND_LEGS = LIMBS[2:]
 

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from pegbar import OrthographicCamera, PerspectiveCamera, _kernels, drawn_lengths, reconstruct_markers
 from pegbar.scene.limb_tree import limb_tree
-from tests.figures import LENGTHS, LIMBS, spans, swinging
+from tests.limbs import LENGTHS, LIMBS, spans, swinging
 from tests.oracles import signs as oracle
 
 SIDE = OrthographicCamera.from_angles(45, 15, 300, (320, 240))
