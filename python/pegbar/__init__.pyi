@@ -93,6 +93,7 @@ from .simulate.elements import Pin as Pin
 from .simulate.elements import Prop as Prop
 from .simulate.engine import simulate_scene as simulate_scene
 from .simulate.layers import render_shadow as render_shadow
+from .simulate.layers import shadow_meshes as shadow_meshes
 from .simulate.materials import ClothMaterial as ClothMaterial
 from .simulate.materials import Look as Look
 from .simulate.materials import RigidMaterial as RigidMaterial

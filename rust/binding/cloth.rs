@@ -6,7 +6,8 @@ use glam::DVec3;
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
 use numpy::{PyReadwriteArray2, PyUntypedArrayMethods};
 use pegbar_kernels::capsule;
-use pegbar_kernels::cloth::{self, Drive, Forces, Sheet};
+use pegbar_kernels::cloth::{self, Drive};
+use pegbar_kernels::sheet::{Forces, Sheet};
 use pyo3::prelude::*;
 
 /// Weights, triangles; then pairs and their metres: links, folds, stays, tethers.

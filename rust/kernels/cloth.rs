@@ -5,8 +5,9 @@
 //! a pin (Kim, Chentanez, Mueller 2012), contacts come last, so that what is stored lies outside the volumes. One
 //! vertex after the other in a fixed order: the same input gives the same bits.
 
-use crate::capsule::Capsule;
+use crate::contact::{Volume, Work};
 use crate::error::{KernelError, check_length};
+use crate::sheet::{Forces, Sheet};
 use glam::DVec3;
 
 /// Half the density of air in kg per cubic metre: the pressure of air that is stopped, over its speed squared.
@@ -14,54 +15,6 @@ const HALF_AIR: f64 = 0.6;
 
 /// Share of the drag that acts along the cloth: air clings to it a little.
 const CLING: f64 = 0.05;
-
-/// A cloth as it is made.
-#[derive(Debug, Clone, Copy)]
-pub struct Sheet<'a> {
-    /// 1/kg by vertex, 0 where it is pinned.
-    pub weights: &'a [f64],
-    /// Corners of the triangles: where air presses.
-    pub triangles: &'a [[u32; 3]],
-    /// Pairs of vertices at a distance, in the order they are solved, the one nearer to a pin first.
-    pub links: &'a [[u32; 2]],
-    /// Metres by link.
-    pub lengths: &'a [f64],
-    /// Pairs of vertices that face each other across a fold.
-    pub folds: &'a [[u32; 2]],
-    /// Metres by fold.
-    pub spans: &'a [f64],
-    /// A vertex and the pinned vertex it hangs from.
-    pub tethers: &'a [[u32; 2]],
-    /// Metres of cloth between the two.
-    pub reaches: &'a [f64],
-    /// Pairs of vertices some links apart on the way from a pin: they carry pulls farther than one link in one go.
-    pub stays: &'a [[u32; 2]],
-    /// Metres of cloth between them, which they may not exceed.
-    pub spread: &'a [f64],
-    /// Metres per newton by which links and folds give way.
-    pub compliances: [f64; 2],
-}
-
-/// What acts on it.
-#[derive(Debug, Clone, Copy)]
-pub struct Forces<'a> {
-    /// Seconds of a substep.
-    pub step: f64,
-    /// m/s^2.
-    pub gravity: DVec3,
-    /// The air's velocity by vertex.
-    pub air: &'a [DVec3],
-    /// How strongly air holds the cloth, 1 a plate of its size.
-    pub drag: f64,
-    /// Rate in 1/s at which motion dies.
-    pub damping: f64,
-    /// Metres kept clear of volumes and ground.
-    pub thickness: f64,
-    /// Of volumes and ground.
-    pub friction: f64,
-    /// Height of the ground, -inf for none.
-    pub ground: f64,
-}
 
 /// What moves it: pinned vertices with their places (S x P), capsules before the first and after every substep.
 #[derive(Debug, Clone, Copy)]
@@ -76,13 +29,6 @@ pub struct Drive<'a> {
     pub substeps: usize,
     /// How often links are gone through in a substep: outwards, inwards and so on.
     pub rounds: usize,
-}
-
-/// A vertex that touched something in this substep: the normal there and how far that surface moved.
-#[derive(Clone, Copy)]
-struct Touch {
-    normal: DVec3,
-    shift: DVec3,
 }
 
 /// Moves `positions` and `velocities` (n) on by all substeps.
@@ -100,7 +46,7 @@ pub fn step_cloth(
     for substep in 0..drive.substeps {
         let (old, new) = (&drive.capsules[substep * count..], &drive.capsules[(substep + 1) * count..]);
         let volumes: Vec<Volume> = old.iter().zip(&new[..count]).map(|(old, new)| Volume::new(old, new)).collect();
-        work.before.copy_from_slice(positions);
+        work.begin(positions);
         blow(sheet, forces, positions, velocities);
         let keep = (-forces.damping * forces.step).exp();
         for ((place, velocity), weight) in positions.iter_mut().zip(velocities.iter_mut()).zip(sheet.weights) {
@@ -112,7 +58,6 @@ pub fn step_cloth(
         for (pin, target) in drive.pins.iter().zip(&drive.targets[substep * pinned..]) {
             positions[*pin as usize] = *target;
         }
-        work.touches.fill(None);
         hold(sheet.folds.iter().zip(sheet.spans), sheet.compliances[1], sheet.weights, forces.step, positions);
         for round in 0..drive.rounds {
             hold_stays(sheet, positions);
@@ -129,19 +74,6 @@ pub fn step_cloth(
         work.take_velocities(forces.step, positions, velocities);
     }
     Ok(())
-}
-
-/// A capsule with the way its ends have come in this substep.
-struct Volume {
-    capsule: Capsule,
-    shifts: [DVec3; 2],
-}
-
-impl Volume {
-    fn new(old: &[f64; 8], new: &[f64; 8]) -> Self {
-        let way = |k: usize| DVec3::new(new[k] - old[k], new[k + 1] - old[k + 1], new[k + 2] - old[k + 2]);
-        Volume { capsule: Capsule::new(new), shifts: [way(0), way(4)] }
-    }
 }
 
 /// The pressure of the air on every triangle, as if the air's relative speed there fell towards zero.
@@ -223,134 +155,6 @@ fn hold_tethers(sheet: &Sheet<'_>, positions: &mut [DVec3]) {
     }
 }
 
-struct Work {
-    before: Vec<DVec3>,
-    touches: Vec<Option<Touch>>,
-    /// By vertex the pin it hangs from and the cloth between.
-    anchors: Vec<(u32, f64)>,
-}
-
-impl Work {
-    fn new(sheet: &Sheet<'_>, positions: &[DVec3]) -> Self {
-        let mut anchors = vec![(0, f64::INFINITY); positions.len()];
-        for ([vertex, pin], reach) in sheet.tethers.iter().zip(sheet.reaches) {
-            anchors[*vertex as usize] = (*pin, *reach);
-        }
-        Work { before: positions.to_vec(), touches: vec![None; positions.len()], anchors }
-    }
-
-    fn push_out(&mut self, sheet: &Sheet<'_>, forces: &Forces<'_>, volumes: &[Volume], positions: &mut [DVec3]) {
-        let volumes = within_reach(volumes, forces.thickness, positions);
-        for volume in &volumes {
-            for link in sheet.links {
-                push_link(*link, sheet, forces, volume, positions, &self.anchors);
-            }
-        }
-        for volume in &volumes {
-            for vertex in 0..positions.len() {
-                self.push_vertex(vertex, sheet, forces, volume, positions);
-            }
-        }
-        let floor = forces.ground + forces.thickness;
-        for (vertex, place) in positions.iter_mut().enumerate() {
-            if sheet.weights[vertex] > 0.0 && place.y < floor {
-                let touch = Touch { normal: DVec3::Y, shift: DVec3::ZERO };
-                let depth = floor - place.y;
-                *place = rub(place.with_y(floor), self.before[vertex], touch, forces.friction * depth);
-                self.touches[vertex] = Some(touch);
-            }
-        }
-    }
-
-    fn push_vertex(
-        &mut self,
-        vertex: usize,
-        sheet: &Sheet<'_>,
-        forces: &Forces<'_>,
-        volume: &Volume,
-        positions: &mut [DVec3],
-    ) {
-        let place = positions[vertex];
-        if sheet.weights[vertex] == 0.0 || !volume.capsule.may_touch(place, forces.thickness) {
-            return;
-        }
-        let near = volume.capsule.nearest(place);
-        let mut depth = forces.thickness - near.distance;
-        if depth > 0.0 {
-            depth -= slack(self.anchors[vertex], volume, forces, positions);
-        }
-        if depth > 0.0 {
-            let shift = volume.shifts[0].lerp(volume.shifts[1], near.share);
-            let touch = Touch { normal: near.normal, shift };
-            positions[vertex] = rub(place + depth * near.normal, self.before[vertex], touch, forces.friction * depth);
-            self.touches[vertex] = Some(touch);
-        }
-    }
-
-    /// What was pushed out leaves the surface no faster than the surface moves: contacts do not throw.
-    fn take_velocities(&self, step: f64, positions: &[DVec3], velocities: &mut [DVec3]) {
-        for (vertex, velocity) in velocities.iter_mut().enumerate() {
-            *velocity = (positions[vertex] - self.before[vertex]) / step;
-            if let Some(touch) = self.touches[vertex] {
-                let leaving = (*velocity - touch.shift / step).dot(touch.normal);
-                *velocity -= leaving.max(0.0) * touch.normal;
-            }
-        }
-    }
-}
-
-/// The volumes that may touch the box around all vertices.
-fn within_reach<'a>(volumes: &'a [Volume], thickness: f64, positions: &[DVec3]) -> Vec<&'a Volume> {
-    let low = positions.iter().fold(DVec3::INFINITY, |low, place| low.min(*place));
-    let high = positions.iter().fold(DVec3::NEG_INFINITY, |high, place| high.max(*place));
-    let near = |volume: &&Volume| volume.capsule.may_touch_box(low, high, thickness);
-    volumes.iter().filter(near).collect()
-}
-
-/// Holds the middle of a link out of a volume.
-fn push_link(
-    link: [u32; 2],
-    sheet: &Sheet<'_>,
-    forces: &Forces<'_>,
-    volume: &Volume,
-    positions: &mut [DVec3],
-    anchors: &[(u32, f64)],
-) {
-    let [a, b] = link.map(|vertex| vertex as usize);
-    let middle = 0.5 * (positions[a] + positions[b]);
-    if !volume.capsule.may_touch(middle, forces.thickness) {
-        return;
-    }
-    let sum = sheet.weights[a] + sheet.weights[b];
-    let near = volume.capsule.nearest(middle);
-    let mut depth = forces.thickness - near.distance;
-    if depth > 0.0 && sum > 0.0 {
-        // The first is nearer to the pins, and pinned itself where the second hangs from it.
-        depth -= slack(anchors[a], volume, forces, positions).max(slack(anchors[b], volume, forces, positions));
-        let push = near.normal * (2.0 * depth.max(0.0) / sum);
-        positions[a] += sheet.weights[a] * push;
-        positions[b] += sheet.weights[b] * push;
-    }
-}
-
-/// How deep a vertex has to stay since its pin is deeper: a pin inside a volume must not tear the cloth around it.
-fn slack(anchor: (u32, f64), volume: &Volume, forces: &Forces<'_>, positions: &[DVec3]) -> f64 {
-    let (pin, reach) = anchor;
-    let place = positions[pin as usize];
-    if reach.is_infinite() || !volume.capsule.may_touch(place, forces.thickness) {
-        return 0.0;
-    }
-    (forces.thickness - volume.capsule.nearest(place).distance - reach).max(0.0)
-}
-
-/// Takes back the way along the surface that friction does not allow, at most `limit` metres of it.
-fn rub(place: DVec3, before: DVec3, touch: Touch, limit: f64) -> DVec3 {
-    let way = place - before - touch.shift;
-    let along = way - way.dot(touch.normal) * touch.normal;
-    let length = along.length();
-    if length <= limit { place - along } else { place - along * (limit / length) }
-}
-
 fn check(
     sheet: &Sheet<'_>,
     forces: &Forces<'_>,
@@ -386,6 +190,7 @@ fn known(argument: &'static str, mut vertices: impl Iterator<Item = u32>, count:
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::capsule::Capsule;
 
     const STILL: [DVec3; 3] = [DVec3::ZERO; 3];
     const FALL: Forces<'_> = Forces {
@@ -452,12 +257,12 @@ mod tests {
     #[test]
     fn lists_that_do_not_fit_are_refused() {
         let drive = Drive { pins: &[3], targets: &[DVec3::ZERO], capsules: &[], substeps: 1, rounds: 1 };
-        let refused = step_cloth(&sheet(&[1.0; 3]), &FALL, &drive, &mut STILL.clone(), &mut STILL.clone());
+        let refused = step_cloth(&sheet(&[1.0; 3]), &FALL, &drive, &mut { STILL }, &mut { STILL });
         assert!(matches!(refused, Err(KernelError::Item { argument: "pins", index: 0, .. })));
         let drive = Drive { pins: &[], targets: &[], capsules: &[[0.0; 8]; 3], substeps: 1, rounds: 1 };
-        let refused = step_cloth(&sheet(&[1.0; 3]), &FALL, &drive, &mut STILL.clone(), &mut STILL.clone());
+        let refused = step_cloth(&sheet(&[1.0; 3]), &FALL, &drive, &mut { STILL }, &mut { STILL });
         assert!(matches!(refused, Err(KernelError::Length { argument: "capsules", wanted: 2, got: 3 })));
-        let refused = step_cloth(&sheet(&[1.0; 2]), &FALL, &drive, &mut STILL.clone(), &mut STILL.clone());
+        let refused = step_cloth(&sheet(&[1.0; 2]), &FALL, &drive, &mut { STILL }, &mut { STILL });
         assert!(matches!(refused, Err(KernelError::Length { argument: "weights", .. })));
     }
 }

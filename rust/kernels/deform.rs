@@ -160,3 +160,57 @@ impl Deformer {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two unit squares beside each other, cut in two each.
+    const STRIP: [DVec2; 6] = [
+        DVec2::new(0.0, 0.0),
+        DVec2::new(0.0, 1.0),
+        DVec2::new(1.0, 0.0),
+        DVec2::new(1.0, 1.0),
+        DVec2::new(2.0, 0.0),
+        DVec2::new(2.0, 1.0),
+    ];
+    const TRIANGLES: [[u32; 3]; 4] = [[0, 2, 1], [1, 2, 3], [2, 4, 3], [3, 4, 5]];
+
+    fn deform(handles: &[u32], guides: &[u32], positions: &[DVec2], stitch: Stitch) -> Result<Vec<DVec2>, KernelError> {
+        let deformer = Deformer::new(&STRIP, &TRIANGLES, handles, guides)?;
+        let mut out = vec![DVec2::NAN; 6];
+        deformer.deform(Frames { positions, shapes: None, iterations: 2, stitch }, &mut out).map(|()| out)
+    }
+
+    #[test]
+    fn a_rigid_motion_is_followed_and_handles_are_met_to_the_bit() {
+        let place = |i: usize| DVec2::from_angle(-2.0).rotate(STRIP[i]) + DVec2::new(1e5, -3.0);
+        for stitch in [Stitch::Poisson, Stitch::Average] {
+            let Ok(got) = deform(&[1, 4], &[], &[place(1), place(4)], stitch) else { unreachable!() };
+            assert!((0..6).all(|i| got[i].abs_diff_eq(place(i), 1e-9)), "{got:?}");
+            assert_eq!((got[1], got[4]), (place(1), place(4)));
+        }
+    }
+
+    #[test]
+    fn a_stretched_pair_of_handles_keeps_the_width() {
+        let Ok(got) = deform(&[0, 4], &[], &[STRIP[0], STRIP[4] * 1.5], Stitch::Poisson) else { unreachable!() };
+        assert!(((got[3] - got[2]).length() - 1.0).abs() < 0.1, "{got:?}");
+    }
+
+    #[test]
+    fn a_guide_steers_but_is_not_met() {
+        let Ok(got) = deform(&[0], &[4], &[DVec2::ZERO, DVec2::new(0.0, 5.0)], Stitch::Poisson) else { unreachable!() };
+        assert!(got[4].abs_diff_eq(DVec2::new(0.0, 2.0), 1e-9), "{got:?}");
+    }
+
+    #[test]
+    fn too_few_handles_and_wrong_lengths_are_refused() {
+        let too_few = deform(&[0], &[], &[DVec2::ZERO], Stitch::Poisson);
+        assert!(matches!(too_few, Err(KernelError::Argument { argument: "handles", .. })));
+        let none = deform(&[0, 4], &[], &[DVec2::ZERO], Stitch::Poisson);
+        assert!(matches!(none, Err(KernelError::Length { argument: "positions", .. })));
+        let wrong = deform(&[0, 9], &[], &[DVec2::ZERO; 2], Stitch::Poisson);
+        assert!(matches!(wrong, Err(KernelError::Item { argument: "handles", index: 1, .. })));
+    }
+}

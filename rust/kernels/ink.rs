@@ -13,6 +13,9 @@ use rayon::prelude::*;
 /// Widest line in samples.
 const WIDEST: f32 = 256.0;
 
+/// Objects of this id draw no lines of their own: shadows on the ground. Lines of others go over them.
+pub const BARE: u16 = 0xFFFE;
+
 /// How lines are drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ink {
@@ -150,6 +153,9 @@ impl<'a> Pen<'a> {
         }
         let swap = band.reciprocal[second] > band.reciprocal[first];
         let (nearer, farther) = if swap { (second, first) } else { (first, second) };
+        if self.surface(band, nearer).is_some_and(|surface| surface.object == BARE) {
+            return;
+        }
         let ends = self.ends_between(band, nearer, farther);
         if ends && !self.dives_between(band, nearer, farther) {
             found.push((nearer as u32, Stroke::Outline));

@@ -2,8 +2,8 @@
 //!
 //! Intermediate shape: squared distance of each triangle from a turned and scaled copy of itself (the first step of
 //! Igarashi, Moscovich, Hughes 2005). With corners as complex numbers that distance is |sum c_k z_k|, c_k the edge
-//! opposite corner k at rest. Stitching: squared distance of each edge from its fitted one. All weights make errors
-//! relative to an edge's length at rest, so that a finely cut rim counts no more than the rest.
+//! opposite corner k at rest. Stitching: squared distance of each edge from its fitted one. Weights make errors about
+//! relative to an edge's length at rest: a finely cut rim counts as much as the rest.
 
 use crate::elimination::minimum_degree;
 use crate::fit::conjugate;
@@ -12,13 +12,17 @@ use crate::ldl::{Entry, Factor, Upper};
 use glam::DVec2;
 
 /// Edges are counted as no shorter than this part of the mean edge: ratios of weights stay within what solves well.
-const SHORTEST: f64 = 1e-3;
+const SHORTEST: f64 = 0.02;
+
+/// The power of an edge's squared length that weighs its error. At -1 errors are relative; a little less keeps the short
+/// edges of a finely cut rim better still, and flat triangles, which count less, then fold no oftener (docs/papers.md).
+const SHORT_EDGES: f64 = -1.25;
 
 /// Triangles are counted as no flatter than this ratio of twice the area to the sum of squared edges (0.29 at best).
 const FLATTEST: f64 = 0.01;
 
 /// How much a hinge resists bending, relative to a triangle: enough to be solved, too little to be seen.
-const HINGE: f64 = 1e-4;
+const HINGE: f64 = 1e-2;
 
 /// An entry of a matrix: row, column, value.
 type Triplet<E> = (u32, u32, E);
@@ -48,9 +52,9 @@ pub fn weigh(places: &[DVec2], triangles: &[[u32; 3]]) -> Vec<Weighted> {
         let edges = edges(triangle).map(|edge| edge / unit.sqrt());
         let squared = edges.map(|edge| edge.length_squared().max(SHORTEST * SHORTEST));
         let total: f64 = squared.iter().sum();
-        let area = edges[0].perp_dot(edges[1]).abs().max(FLATTEST * total);
-        let stitch = squared.map(f64::recip);
-        Weighted { edges, stitch, similar: stitch.iter().sum::<f64>() / area }
+        let wide = (edges[0].perp_dot(edges[1]).abs() / total).max(FLATTEST);
+        let stitch = squared.map(|squared| wide.sqrt() * squared.powf(SHORT_EDGES));
+        Weighted { edges, stitch, similar: squared.iter().map(|squared| squared.recip()).sum() }
     };
     triangles.iter().map(weighted).collect()
 }
@@ -70,7 +74,7 @@ pub fn similar(
         for k in 0..3 {
             if w.edges[k] == DVec2::ZERO {
                 // Corners in one place: no ratio of edges holds them together.
-                spring(corners[(k + 1) % 3], corners[(k + 2) % 3], DVec2::X * w.stitch[k], &mut out);
+                spring(corners[(k + 1) % 3], corners[(k + 2) % 3], DVec2::X, &mut out);
             }
         }
     }
@@ -164,4 +168,43 @@ impl<E: Entry> System<E> {
 enum Role {
     Free(u32),
     Held(u32),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hinge::hinges;
+
+    /// Two triangles that share vertex 2 only, and one of no size at vertex 4.
+    const PLACES: [DVec2; 6] = [
+        DVec2::new(0.0, 0.0),
+        DVec2::new(2.0, 0.0),
+        DVec2::new(1.0, 1.0),
+        DVec2::new(0.0, 2.0),
+        DVec2::new(3.0, 3.0),
+        DVec2::new(3.0, 3.0),
+    ];
+    const TRIANGLES: [[u32; 3]; 3] = [[0, 1, 2], [2, 3, 4], [4, 5, 4]];
+
+    #[test]
+    fn what_is_turned_grown_and_moved_costs_nothing() {
+        let weighted = weigh(&PLACES, &TRIANGLES);
+        let entries = similar(&PLACES, &TRIANGLES, &weighted, &hinges(&TRIANGLES, 6));
+        let moved = PLACES.map(|place| DVec2::new(-0.3, 2.0).rotate(place) + DVec2::splat(5.0));
+        let mut forces = [DVec2::ZERO; 6];
+        entries.iter().for_each(|(i, j, value)| forces[*i as usize] += value.rotate(moved[*j as usize]));
+        assert!(forces.iter().all(|force| force.length() < 1e-10), "{forces:?}");
+    }
+
+    #[test]
+    fn hinges_and_flat_triangles_leave_a_system_that_can_be_solved() {
+        let weighted = weigh(&PLACES, &TRIANGLES);
+        let entries = similar(&PLACES, &TRIANGLES, &weighted, &hinges(&TRIANGLES, 6));
+        let Some(system) = System::new(6, &entries, &[0, 1]) else { unreachable!() };
+        let mut places = [DVec2::ZERO; 6];
+        system.solve(&[0, 1], &[DVec2::ZERO, DVec2::new(0.0, 4.0)], &mut places);
+        let wanted = PLACES.map(|place| DVec2::new(0.0, 2.0).rotate(place));
+        assert!(places.iter().zip(wanted).all(|(got, want)| got.abs_diff_eq(want, 1e-8)), "{places:?}");
+        assert!(System::new(6, &entries, &[0]).is_none());
+    }
 }

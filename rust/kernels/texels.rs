@@ -236,6 +236,6 @@ mod tests {
         assert_eq!(run(0.0, 0.5, 0.0)[0], [100, 0, 128, 255]);
         assert_eq!((run(-3.0, -1.0, 1.0)[0], run(7.0, 7.0, 0.0)[0]), (pixels[0], pixels[3]));
         assert_eq!(run(-3.0, 1.0, 0.5)[5..9], [pixels[2], pixels[2], [0, 0, 128, 255], pixels[3]]);
-        assert_eq!(run(1e300, -1e300, -1e300)[15], pixels[0]);
+        assert_eq!(run(-1e300, 1e300, 1.0)[15], pixels[2]);
     }
 }

@@ -147,7 +147,7 @@ impl Buffer {
         }
         self.colors.resize(rows * width, [0.0; 4]);
         self.painted.clear();
-        self.painted.resize(rows, usize::MAX..0);
+        self.painted.resize(rows, Range { start: usize::MAX, end: 0 });
         self.width = width;
     }
 
@@ -215,4 +215,68 @@ fn pixel_mean(colors: &[[f32; 4]], width: usize, samples: usize, column: usize) 
         }
     }
     sum.map(|sum| sum / (samples * samples) as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CORNERS: [DVec2; 4] =
+        [DVec2::new(-0.5, -0.5), DVec2::new(4.5, -0.5), DVec2::new(4.5, 3.5), DVec2::new(-0.5, 3.5)];
+    const HALVES: [[u32; 3]; 2] = [[0, 1, 2], [0, 2, 3]];
+
+    fn checkerboard() -> Vec<[u8; 4]> {
+        (0..20u8).map(|i| if (i % 5 + i / 5) % 2 == 0 { [9 * i, 255, 0, 255] } else { [40, 0, 7 * i, 90] }).collect()
+    }
+
+    fn render(vertices: &[DVec2], triangles: &[[u32; 3]], samples: usize) -> Result<Vec<[u8; 4]>, KernelError> {
+        let pixels = checkerboard();
+        let sheet = Sheet { vertices, texture_coordinates: &CORNERS, triangles };
+        let mut out = vec![[0; 4]; 20];
+        let target = Target { pixels: &mut out, width: 5, samples };
+        render_sheet(sheet, Texture { pixels: &pixels, width: 5, height: 4 }, target).map(|()| out)
+    }
+
+    #[test]
+    fn a_checkerboard_in_place_is_kept_to_the_bit() {
+        assert_eq!(render(&CORNERS, &HALVES, 1), Ok(checkerboard()));
+    }
+
+    #[test]
+    fn a_whole_step_moves_every_pixel_and_leaves_nothing_behind() {
+        let moved = CORNERS.map(|corner| corner + DVec2::new(2.0, 1.0));
+        let texture = checkerboard();
+        let wanted: Vec<[u8; 4]> =
+            (0..20).map(|i| if i % 5 >= 2 && i >= 5 { texture[i - 7] } else { [0; 4] }).collect();
+        assert_eq!(render(&moved, &HALVES, 1), Ok(wanted));
+    }
+
+    #[test]
+    fn a_buffer_is_clear_again_for_the_next_band() {
+        let mut buffer = Buffer::default();
+        buffer.prepare(2, 3);
+        buffer.colors[4] = [1.0; 4];
+        buffer.painted[1] = 1..2;
+        for (rows, width) in [(3, 4), (1, 2)] {
+            buffer.prepare(rows, width);
+            assert_eq!(buffer.colors, vec![[0.0; 4]; rows * width]);
+            assert!(buffer.painted.iter().all(Range::is_empty));
+        }
+    }
+
+    #[test]
+    fn samples_of_a_pixel_are_averaged() {
+        // A quad over the left half of the first column: two of its four samples.
+        let half = [(-0.5, -0.5), (0.0, -0.5), (0.0, 3.5), (-0.5, 3.5)].map(DVec2::from);
+        let alphas = |out: Vec<[u8; 4]>| out.iter().map(|pixel| pixel[3] > 0).collect::<Vec<_>>();
+        let wanted: Vec<bool> = (0..20).map(|i| i % 5 == 0).collect();
+        assert_eq!(render(&half, &HALVES, 2).map(alphas), Ok(wanted));
+    }
+
+    #[test]
+    fn wrong_sizes_and_corners_are_refused() {
+        assert!(matches!(render(&CORNERS, &[[0, 1, 4]], 1), Err(KernelError::Item { argument: "triangles", .. })));
+        assert!(matches!(render(&CORNERS[..3], &[], 1), Err(KernelError::Length { .. })));
+        assert!(matches!(render(&CORNERS, &HALVES, 0), Err(KernelError::Argument { argument: "size", .. })));
+    }
 }

@@ -39,11 +39,11 @@ def deform(vertices, triangles, handles, positions, shapes=None, iterations=1, s
     triangles, n = np.asarray(triangles), len(z)
     edges = np.roll(z[triangles], -1, 1) - np.roll(z[triangles], -2, 1)
     unit = (np.abs(edges) ** 2).mean()
-    squared = np.maximum(np.abs(edges) ** 2 / unit, 1e-6)
+    squared = np.maximum(np.abs(edges) ** 2 / unit, 4e-4)
     area = np.abs((edges[:, 0].conj() * edges[:, 1]).imag) / unit
-    weight = (1 / squared).sum(1) / np.maximum(area, 0.01 * squared.sum(1))
+    stitching = np.sqrt(np.maximum(area / squared.sum(1), 0.01))[:, None] * squared**-1.25
     similar = np.zeros((n, n), complex)
-    for corners, c, w in zip(triangles, edges / np.sqrt(unit), weight, strict=True):
+    for corners, c, w in zip(triangles, edges / np.sqrt(unit), (1 / squared).sum(1), strict=True):
         similar[np.ix_(corners, corners)] += w * np.outer(c.conj(), c)
     out = _solve((similar, np.zeros(n)), handles, moved)
     shapes = np.asarray(vertices, float)[triangles] if shapes is None else shapes
@@ -54,7 +54,7 @@ def deform(vertices, triangles, handles, positions, shapes=None, iterations=1, s
             out[handles] = moved
             continue
         laplacian, load, f = np.zeros((n, n), complex), np.zeros(n, complex), fitted @ [1, 1j]
-        for corners, q, w in zip(triangles, f, 1 / squared, strict=True):
+        for corners, q, w in zip(triangles, f, stitching, strict=True):
             for k in range(3):
                 i, j = (k + 1) % 3, (k + 2) % 3
                 d = np.zeros(n)

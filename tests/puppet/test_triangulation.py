@@ -72,7 +72,7 @@ def test_max_area_is_about_the_largest_triangle():
 
 def test_holes_islands_and_separate_outlines():
     hole, island = SQUARE / 2 + 2, SQUARE / 4 + 3
-    mesh = triangulate([SQUARE, island, SQUARE + [20, 0]], holes=[hole[::-1]])
+    mesh = triangulate([SQUARE, island, SQUARE + np.array([20, 0])], holes=[hole[::-1]])
     np.testing.assert_allclose(areas(mesh).sum(), 64 - 16 + 4 + 64)
     assert len(mesh.rings) == 4
     assert np.array_equal(mesh.vertices[mesh.rings[3]], hole[::-1])
@@ -92,7 +92,7 @@ def test_the_outline_may_run_either_way():
         ([[[2, 2], [2, 2], [2, 2]]], {}, r"outlines\[0\]: all places lie on one line"),
         ([SQUARE[[0, 2, 1, 3]]], {}, r"edge outlines\[0\]\[\d\] - outlines\[0\]\[\d\] crosses the edge outlines"),
         ([SQUARE, SQUARE + 4], {}, r"outlines\[[01]\].* crosses the edge outlines\[[01]\]"),
-        ([SQUARE], {"holes": [SQUARE + [4, 0.5]]}, r"crosses the edge"),
+        ([SQUARE], {"holes": [SQUARE + np.array([4, 0.5])]}, r"crosses the edge"),
         ([SQUARE], {"holes": [SQUARE + 20]}, r"holes\[0\]\[0\]: not inside the outlines"),
         ([SQUARE], {"points": [[1, 1], [9, 9]]}, r"points\[1\]: not inside the outlines"),
         ([SQUARE], {"points": [[1, 1], [8, 8]]}, r"points\[1\]: the same place as outlines\[0\]\[2\]"),

@@ -72,10 +72,12 @@ def reaches(
     is nothing, and beyond it the nearest point of anything else (n,), ``farthest`` where there is nothing.
     """
     rows, lower = _rows(character, frame)
-    steps = np.linspace(0, farthest, 81)
+    steps = np.linspace(0, farthest, 161)
     points = (origins[:, None] + steps[:, None] * outward[:, None]).reshape(-1, 3)
     inside = [_inside(points, rows[chosen]).reshape(len(origins), -1) for chosen in (lower, ~lower)]
-    outer = np.where(inside[0].any(axis=1), steps[len(steps) - 1 - inside[0][:, ::-1].argmax(axis=1)], 0.0)
+    # The first step that is clear, so that the body ends before it.
+    last = len(steps) - 1 - inside[0][:, ::-1].argmax(axis=1)
+    outer = np.where(inside[0].any(axis=1), steps[np.minimum(last + 1, len(steps) - 1)], 0.0)
     others = inside[1] & (steps > outer[:, None])
     return outer, np.where(others.any(axis=1), steps[others.argmax(axis=1)], farthest)
 

@@ -15,7 +15,7 @@ from pegbar.scene.camera import PerspectiveCamera
 from pegbar.scene.mesh import Mesh
 from pegbar.simulate.passes import Passes, render_passes
 
-#: Object id of the shadow in the passes.
+#: Object id of the shadow in the passes; the renderer draws no ink around it (``BARE`` in ``rust/kernels/ink.rs``).
 SHADOW_ID = 0xFFFE
 
 
@@ -66,6 +66,25 @@ def render_shadow(
     >>> shadow.beauty[3, 4].tolist()
     [0.0, 0.0, 0.0, 0.5]
     """
+    return render_passes(
+        shadow_meshes(meshes, ground, light=light, darkness=darkness), camera, samples=samples, near=near
+    )
+
+
+def shadow_meshes(
+    meshes: Iterable[Mesh], ground: float, *, light: ArrayLike = (0.4, 0.8, 0.45), darkness: float = 0.35
+) -> list[Mesh]:
+    """Return the shadows of ``meshes`` on the ground plane as meshes, to be rendered with the elements in one go.
+
+    They are flat and black with alpha ``darkness``, and no ink lines are drawn around them. Parameters and errors are
+    those of ``render_shadow``.
+
+    Examples
+    --------
+    >>> roof = Mesh([[-1, 1, -1], [1, 1, -1], [1, 1, 1]], [[0, 1, 2]], (1, 0, 0, 1))
+    >>> shadow_meshes([roof], 0.0, light=(1, 1, 0))[0].vertices.tolist()
+    [[-2.0, 0.0, -1.0], [0.0, 0.0, -1.0], [0.0, 0.0, 1.0]]
+    """
     direction = arrays.floats("light", light, (3,))
     if not direction[1] > 0:
         raise ValueError(f"light: want a direction from above the ground, got {direction.tolist()}")
@@ -81,8 +100,9 @@ def render_shadow(
         above = (height[mesh.triangles] >= 0).any(axis=1)
         fallen = mesh.vertices - np.maximum(height, 0)[:, None] * slope
         fallen[:, 1] = ground
-        flat.append(Mesh(fallen, mesh.triangles[above], color, SHADOW_ID, np.tile((0.0, 1.0, 0.0), (len(fallen), 1))))
-    return render_passes(flat, camera, samples=samples, near=near)
+        up = np.broadcast_to((0.0, 1.0, 0.0), fallen.shape)
+        flat.append(Mesh(fallen, mesh.triangles[above], color, SHADOW_ID, up))
+    return flat
 
 
 def under(passes: Passes, shadow: Passes) -> Passes:

@@ -43,6 +43,15 @@ def measure_cloth(scene: SimulationScene, cache: Cache, name: str) -> ClothMeasu
     """Measure the cloth ``name`` of ``scene`` in all frames of ``cache``.
 
     Raises ValueError for an element that is no cloth of the scene and KeyError for frames that are not in the cache.
+
+    Examples
+    --------
+    >>> from pegbar.simulate.cache import MemoryCache
+    >>> flag = Cloth("flag", np.eye(3), np.array([[0, 1, 2]]))
+    >>> scene, cache = SimulationScene(frame_rate=24, frames=1, elements=(flag,)), MemoryCache()
+    >>> cache.write("flag", 0, {"positions": 1.1 * np.eye(3)})
+    >>> measure_cloth(scene, cache, "flag").stretch.round(3).tolist()
+    [[0.1, 0.1, 0.1]]
     """
     cloth = next((element for element in scene.elements if element.name == name), None)
     if not isinstance(cloth, Cloth):

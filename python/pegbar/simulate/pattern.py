@@ -59,7 +59,9 @@ def _sampled(texture: NDArray[np.uint8], places: Floats) -> NDArray[np.float32]:
     linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
     linear[..., 3] = srgb[..., 3]
     height, width = texture.shape[:2]
-    x = np.clip(places[:, 0] % 1.0 * width - 0.5, 0, width - 1)
+    # Beyond its end a closed sheet begins anew.
+    across = np.where(places[:, 0] > 1 + 1e-9, places[:, 0] - 1, places[:, 0])
+    x = np.clip(across * width - 0.5, 0, width - 1)
     y = np.clip(places[:, 1] * height - 0.5, 0, height - 1)
     left, top = x.astype(int), y.astype(int)
     right, low = np.minimum(left + 1, width - 1), np.minimum(top + 1, height - 1)

@@ -62,9 +62,11 @@ def preset_elements(
     --------
     >>> from pegbar.scene.volumes import TaperedCylinders
     >>> import numpy as np
-    >>> feet = np.array([[[0.1, 0.1, 0.0], [-0.1, 0.1, 0.0]]])
-    >>> none = np.empty((1, 0, 3)), np.empty((1, 0, 3)), np.empty((1, 0)), np.empty((1, 0))
-    >>> boy = Character("boy", ("left_foot", "right_foot"), feet, (), TaperedCylinders(*none))
+    >>> names = ("pelvis", "neck", "head", "left_hip", "left_knee", "left_foot", "right_foot")
+    >>> heights = np.array([0.95, 1.45, 1.6, 0.9, 0.5, 0.1, 0.1])
+    >>> markers = np.stack([0 * heights, heights, 0 * heights], axis=1)[None]
+    >>> none = TaperedCylinders(np.empty((1, 0, 3)), np.empty((1, 0, 3)), np.empty((1, 0)), np.empty((1, 0)))
+    >>> boy = Character("boy", names, markers, (), none)
     >>> balls, = preset_elements("balls", boy, ground=0.0, count=5, size=0.1)
     >>> balls.name, len(balls.radii)
     ('balls', 5)

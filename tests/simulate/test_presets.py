@@ -1,0 +1,148 @@
+"""Presets: sizes from the character, clear of the body at the start, every wrong setting named."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pegbar import _kernels
+from pegbar.simulate.elements import Balls, Cloth, Prop
+from pegbar.simulate.figure import body_height, capsules_of, limb_between
+from pegbar.simulate.presets import PRESETS, preset_elements
+from pegbar.simulate.scene import Character, SimulationScene
+from pegbar.simulate.wearing import grid_triangles
+from tests.walkers import walker
+
+
+def scaled(figure: Character, factor: float) -> Character:
+    volumes = figure.volumes
+    grown = replace(volumes, **{name: factor * getattr(volumes, name) for name in volumes.__dataclass_fields__})
+    return replace(figure, markers=factor * figure.markers, volumes=grown)
+
+
+@pytest.mark.parametrize("kind", PRESETS)
+def test_sizes_are_the_characters(kind):
+    small, large = (preset_elements(kind, scaled(walker(8), factor), ground=0.0, seed=1) for factor in (1, 2))
+    assert [element.name for element in small] == [element.name for element in large]
+    for one, two in zip(small, large, strict=True):
+        if isinstance(one, Balls):
+            assert two.radii == pytest.approx(2 * one.radii)
+        elif isinstance(one, Cloth) and isinstance(two, Cloth):
+            rests = [cloth.vertices if cloth.rest is None else cloth.rest for cloth in (one, two)]
+            spans = [np.linalg.norm(np.ptp(rest, axis=0)) for rest in rests]
+            assert spans[1] == pytest.approx(2 * spans[0], rel=0.05)
+
+
+@pytest.mark.parametrize("kind", PRESETS)
+def test_every_preset_makes_a_scene_with_its_names(kind):
+    figure = walker(8)
+    elements = preset_elements(kind, figure, name="mine", ground=0.0)
+    assert all(element.name.startswith("mine") for element in elements)
+    SimulationScene(24, 8, elements, (figure,), ground=0.0)
+
+
+def test_a_skirt_starts_outside_of_trunk_and_legs():
+    figure = walker(8)
+    (skirt,) = preset_elements("skirt", figure)
+    lower = [i for i, name in enumerate(figure.limb_names) if name.partition("_")[2] in ("thigh", "shin") or i == 0]
+    rows = np.ascontiguousarray(capsules_of(figure, 0)[lower])
+    points = np.concatenate([skirt.vertices, skirt.vertices[skirt.triangles].mean(axis=1)])
+    assert _kernels.capsule_distances(points, rows)[0].min() > 0
+    assert skirt.pins[0].vertices.tolist() == list(range(72))
+    top = skirt.vertices[:72]
+    assert np.ptp(top[:, 1]) < 1e-9
+    assert np.linalg.norm(skirt.rest[:72] - top, axis=1).max() < 1e-9
+
+
+def test_scarves_hang_at_the_wrists():
+    figure = walker(8)
+    scarves = preset_elements("scarves", figure, length=0.5)
+    assert [scarf.name for scarf in scarves] == ["scarves_left", "scarves_right"]
+    for side, scarf in zip(("left", "right"), scarves, strict=True):
+        hand, elbow = (figure.markers[0, figure.marker_names.index(f"{side}_{joint}")] for joint in ("hand", "elbow"))
+        wrist = elbow + 0.85 * (hand - elbow)
+        assert np.linalg.norm(scarf.vertices[scarf.pins[0].vertices] - wrist, axis=1).max() < 0.06
+        assert np.ptp(scarf.rest[:, 0]) == pytest.approx(0.5 * body_height(figure))
+        assert scarf.pins[0].target == f"{side}_forearm"
+    assert len(preset_elements("scarves", figure, hands="left")) == 1
+
+
+def test_balls_lie_apart_on_the_ground_and_a_seed_gives_the_same():
+    figure = walker(24)
+    (balls,) = preset_elements("balls", figure, ground=0.02, seed=3, count=30)
+    assert balls.centers[:, 1] == pytest.approx(0.02 + balls.radii)
+    gaps = np.linalg.norm(balls.centers[:, None] - balls.centers[None], axis=2) - balls.radii - balls.radii[:, None]
+    assert gaps[~np.eye(30, dtype=bool)].min() > 0
+    assert _kernels.capsule_distances(balls.centers, capsules_of(figure, 0))[0].min() > 0.03
+    (same,), (other,) = (preset_elements("balls", figure, ground=0.02, seed=seed, count=30) for seed in (3, 4))
+    assert (same.centers == balls.centers).all()
+    assert (other.centers != balls.centers).any()
+
+
+def test_a_clothesline_runs_along_the_way_on_the_hands_side():
+    figure = walker(24, speed=1.5)
+    line, *pieces = preset_elements("clothesline", figure, ground=0.0, side="left", count=3)
+    assert isinstance(line, Prop)
+    assert len(pieces) == 3
+    assert np.ptp(line.vertices[:, 2]) > 3 * np.ptp(line.vertices[:, 0])
+    # The figure walks along +Z, so its left is +X.
+    hand = figure.markers[:, figure.marker_names.index("left_hand"), 0].max()
+    assert 0.5 * hand < line.vertices[:, 0].mean() <= hand
+    for piece in pieces:
+        assert piece.vertices[piece.pins[0].vertices, 1] == pytest.approx(piece.vertices[:, 1].max())
+
+
+@pytest.mark.parametrize(
+    ("kind", "settings", "words"),
+    [
+        ("kilt", {}, "no preset 'kilt': there are scarves, skirt, clothesline, balls"),
+        ("skirt", {"lenght": 1}, "skirt: no setting 'lenght': there are color, second"),
+        ("skirt", {"length": -1}, "length: want a finite number"),
+        ("skirt", {"flare": 1.0}, "flare: want less than 1"),
+        ("skirt", {"fineness": 3}, "fineness: want 8 to 512"),
+        ("skirt", {"color": "red"}, "skirt: color: want #rrggbb, got 'red'"),
+        ("skirt", {"stiffness": -1}, "bend: want a finite number"),
+        ("scarves", {"hands": "all"}, "hands: want left, right or both"),
+        ("scarves", {"pattern": "paisley"}, "pattern: want one of"),
+        ("balls", {"count": 0}, "count: want 1 to 2000"),
+        ("balls", {"ground": None}, "balls: want a ground"),
+        ("clothesline", {"side": "up"}, "side: want left or right"),
+        ("clothesline", {"count": 0}, "count: want 1 to 50"),
+    ],
+)
+def test_what_is_wrong_is_named(kind, settings, words):
+    with pytest.raises(ValueError, match=words):
+        preset_elements(kind, walker(4), **{"ground": 0.0, **settings})
+
+
+def test_colours_may_be_written_as_in_pictures():
+    (skirt,) = preset_elements("skirt", walker(4), color="#ff8000", second=(0.1, 0.2, 0.3, 1.0))
+    assert skirt.look.color == pytest.approx((1.0, 0.2158605, 0.0, 1.0))
+    assert skirt.look.second == (0.1, 0.2, 0.3, 1.0)
+
+
+def test_limbs_are_found_by_their_markers_or_by_their_places():
+    figure = walker(8)
+    assert limb_between(figure, "left_hand", "left_elbow") == figure.limb_names.index("left_forearm")
+    bare = replace(figure, limb_markers=None)
+    for limb, (start, end) in enumerate(figure.limb_markers):
+        assert limb_between(bare, start, end) == limb
+    with pytest.raises(ValueError, match="walker: no limb from head to left_foot"):
+        limb_between(figure, "head", "left_foot")
+    with pytest.raises(ValueError, match="walker: no marker 'tail': there are pelvis"):
+        limb_between(bare, "tail", "left_foot")
+
+
+def test_grids_are_whole_and_closed():
+    open_grid, closed = grid_triangles(3, 4), grid_triangles(3, 4, closed=True)
+    assert len(open_grid) == 2 * 2 * 3
+    assert len(closed) == 2 * 2 * 4
+    edges = np.sort(np.concatenate([closed[:, [0, 1]], closed[:, [1, 2]], closed[:, [2, 0]]]), axis=1)
+    _, counts = np.unique(edges, axis=0, return_counts=True)
+    assert (counts == 1).sum() == 8
+    assert set(counts.tolist()) == {1, 2}
+    # Every edge is gone along once in each direction: all triangles turn the same way.
+    directed = np.concatenate([closed[:, [0, 1]], closed[:, [1, 2]], closed[:, [2, 0]]])
+    assert len(np.unique(directed, axis=0)) == len(directed)
