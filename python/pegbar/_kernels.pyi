@@ -199,17 +199,3 @@ def constrained_delaunay(
     points: _Doubles, edges: NDArray[np.uint32]
 ) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]: ...
 def inside_rings(places: _Doubles, rings: list[tuple[_Doubles, bool]]) -> NDArray[np.bool_]: ...
-def capsule_distances(points: _Doubles, capsules: _Doubles) -> tuple[_Doubles, NDArray[np.uint32]]: ...
-def step_cloth(
-    made: tuple[_Doubles, _Indices, _Indices, _Doubles, _Indices, _Doubles, _Indices, _Doubles, _Indices, _Doubles],
-    acting: tuple[
-        tuple[float, float],
-        tuple[float, tuple[float, float, float]],
-        tuple[float, float, float, float, float],
-        int,
-    ],
-    air: _Doubles,
-    pins: tuple[_Indices, _Doubles],
-    capsules: _Doubles,
-    state: tuple[_Doubles, _Doubles],
-) -> None: ...
