@@ -31,6 +31,8 @@ ELEVATION_SPREAD, ROLL_SPREAD = math.radians(6), math.radians(2)
 NO_FIT = 0.27
 #: From this error on, a user should hear that the clip has no pose like the drawn one.
 POOR_FIT = 0.1
+# Errors of poses that are about as alike, as parts of the best one's, and degrees of facing that make no difference.
+_ALIKE, _TURN = 1.3, 20.0
 _USUAL_FIELD_OF_VIEW = math.radians(40)
 #: Half the distance between the left and right limbs of a figure that is no person, in metres.
 _HALF_WIDTH = 0.1
@@ -176,17 +178,23 @@ def _facing(motion: Motion) -> Floats:
 
 def _choice(fit: PoseFit, points: Floats, towards: Floats, wanted: View | None) -> tuple[int, float, View]:
     """The best pose of the wanted view, how far beside its facing the camera stands, and the view."""
-    azimuths = []
-    for pose in fit.ranking[: np.isfinite(fit.costs).sum()]:
+    found = []
+    for pose in fit.ranking[: np.isfinite(fit.costs).sum()].tolist():
         camera = fit.cameras[pose]
         assert camera is not None
         apart = camera.position - points[pose].mean(axis=0)
         azimuth = (math.degrees(math.atan2(apart[0], apart[2])) - towards[pose] + 180) % 360 - 180
-        azimuths.append((int(pose), float(azimuth), view_of(azimuth)))
-        if wanted in (None, azimuths[-1][2]):
-            return azimuths[-1]
-    assert wanted is not None
-    return (*azimuths[0][:2], wanted)
+        found.append((pose, float(azimuth), view_of(azimuth)))
+    fitting = [entry for entry in found if wanted in (None, entry[2])]
+    if not fitting:
+        assert wanted is not None
+        return (*found[0][:2], wanted)
+    # Of poses that are about as alike the one is taken that faces as the clip mostly does: a pose in the middle of a
+    # turn would show the rest of the clip from the wrong side.
+    turned = np.abs((towards[:, None] - towards[None, :] + 180) % 360 - 180)
+    strays = np.round(np.median(turned, axis=0) / _TURN)
+    alike = [entry for entry in fitting if fit.errors[entry[0]] <= _ALIKE * fit.errors[fitting[0][0]]]
+    return min(alike, key=lambda entry: float(strays[entry[0]]))
 
 
 def _completed(source: PuppetInput, moved: list[int], points: Floats, camera: PerspectiveCamera) -> Floats:
