@@ -17,7 +17,10 @@ from typing import Any
 os.environ.setdefault("RAYON_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-NAMES = ("composite", "depth", "raster", "batch", "motion", "match", "warp", "registration", "pose", "lift", "deform")
+NAMES = (
+    *("composite", "depth", "raster", "batch", "motion", "match", "warp", "registration", "pose", "lift"),
+    *("deform", "simulation"),
+)
 
 
 def main(names: list[str]) -> int:

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
-    "SOURCES",
     "Deformer",
+    "SOURCES",
     "average_triangles",
     "capsule_distances",
     "composite_matte",
@@ -159,6 +159,20 @@ def search_clips(
     block: int,
 ) -> tuple[_Floats, NDArray[np.uint32]]: ...
 def segment_path(costs: _Doubles, steps: NDArray[np.uint32]) -> tuple[NDArray[np.uint32], float]: ...
+def capsule_distances(points: _Doubles, capsules: _Doubles) -> tuple[_Doubles, NDArray[np.uint32]]: ...
+def step_cloth(
+    made: tuple[_Doubles, _Indices, _Indices, _Doubles, _Indices, _Doubles, _Indices, _Doubles, _Indices, _Doubles],
+    acting: tuple[
+        tuple[float, float],
+        tuple[float, tuple[float, float, float]],
+        tuple[float, float, float, float, float],
+        int,
+    ],
+    air: _Doubles,
+    pins: tuple[_Indices, _Doubles],
+    capsules: _Doubles,
+    state: tuple[_Doubles, _Doubles],
+) -> None: ...
 def fit_triangles(shapes: _Doubles, intermediate: _Doubles, triangles: NDArray[np.uint32]) -> _Doubles: ...
 def average_triangles(fitted: _Doubles, triangles: NDArray[np.uint32], count: int) -> _Doubles: ...
 

@@ -257,12 +257,12 @@ mod tests {
     #[test]
     fn lists_that_do_not_fit_are_refused() {
         let drive = Drive { pins: &[3], targets: &[DVec3::ZERO], capsules: &[], substeps: 1, rounds: 1 };
-        let refused = step_cloth(&sheet(&[1.0; 3]), &FALL, &drive, &mut STILL.clone(), &mut STILL.clone());
+        let refused = step_cloth(&sheet(&[1.0; 3]), &FALL, &drive, &mut { STILL }, &mut { STILL });
         assert!(matches!(refused, Err(KernelError::Item { argument: "pins", index: 0, .. })));
         let drive = Drive { pins: &[], targets: &[], capsules: &[[0.0; 8]; 3], substeps: 1, rounds: 1 };
-        let refused = step_cloth(&sheet(&[1.0; 3]), &FALL, &drive, &mut STILL.clone(), &mut STILL.clone());
+        let refused = step_cloth(&sheet(&[1.0; 3]), &FALL, &drive, &mut { STILL }, &mut { STILL });
         assert!(matches!(refused, Err(KernelError::Length { argument: "capsules", wanted: 2, got: 3 })));
-        let refused = step_cloth(&sheet(&[1.0; 2]), &FALL, &drive, &mut STILL.clone(), &mut STILL.clone());
+        let refused = step_cloth(&sheet(&[1.0; 2]), &FALL, &drive, &mut { STILL }, &mut { STILL });
         assert!(matches!(refused, Err(KernelError::Length { argument: "weights", .. })));
     }
 }

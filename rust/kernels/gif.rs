@@ -79,22 +79,28 @@ fn indices(frame: &[u8], channels: usize, table: &[u8]) -> Vec<u8> {
 
 /// The smallest rectangle that holds what is shown, packed; one pixel where nothing is.
 fn pack(frame: &[u8], before: Option<&[u8]>, width: usize, height: usize) -> Packed {
-    let shown = |at: usize| before.map_or(frame[at] != CLEAR, |before| frame[at] != before[at]);
-    let row_shows = |row: &usize| (row * width..(row + 1) * width).any(shown);
-    let Some(top) = (0..height).find(row_shows) else {
-        let data = compress(std::iter::once(CLEAR));
-        return Packed { place: [0, 0, 1, 1], data };
+    let empty = vec![CLEAR; if before.is_some() { 0 } else { frame.len() }];
+    let below = before.unwrap_or(&empty);
+    let rows = |row: usize| (&frame[row * width..(row + 1) * width], &below[row * width..(row + 1) * width]);
+    let differs = |row: &usize| rows(*row).0 != rows(*row).1;
+    let mut packer = Packer::new();
+    let Some(top) = (0..height).find(differs) else {
+        packer.push(CLEAR);
+        return Packed { place: [0, 0, 1, 1], data: packer.finish() };
     };
-    let bottom = (top..height).rev().find(row_shows).map_or(top, |row| row + 1);
+    let bottom = (top..height).rev().find(differs).map_or(top, |row| row + 1);
     let (mut left, mut right) = (width, 0);
-    for row in top..bottom {
-        let start = row * width;
-        left = (0..left).find(|column| shown(start + column)).unwrap_or(left);
-        right = (right..width).rev().find(|column| shown(start + column)).map_or(right, |column| column + 1);
+    for (shown, under) in (top..bottom).map(rows) {
+        let unlike = |&column: &usize| shown[column] != under[column];
+        left = (0..left).find(unlike).unwrap_or(left);
+        right = (right..width).rev().find(unlike).map_or(right, |column| column + 1);
     }
-    let pixels = (top..bottom).flat_map(|row| row * width + left..row * width + right);
-    let data = compress(pixels.map(|at| if shown(at) { frame[at] } else { CLEAR }));
-    Packed { place: [left, top, right - left, bottom - top], data }
+    for (shown, under) in (top..bottom).map(rows) {
+        for (&index, &old) in shown[left..right].iter().zip(&under[left..right]) {
+            packer.push(if index == old { CLEAR } else { index });
+        }
+    }
+    Packed { place: [left, top, right - left, bottom - top], data: packer.finish() }
 }
 
 /// Codes of growing width, least significant bit first, in sub-blocks of at most 255 bytes.
@@ -135,71 +141,78 @@ impl Writer {
     }
 }
 
-/// A table of strings that were seen: the code of a known string with one more index.
-struct Strings {
-    /// The string's code and the index, above them the code of both; open addressing.
-    entries: Vec<u32>,
-}
-
 const SLOTS: usize = 1 << 14;
 const FREE: u32 = u32::MAX;
 
-impl Strings {
-    /// The code of `prefix` followed by `index`, or the slot where it belongs.
-    fn find(&self, prefix: u16, index: u8) -> Result<u16, usize> {
-        let key = (u32::from(prefix) << 8) | u32::from(index);
-        let mut slot = (key.wrapping_mul(0x9E37_79B1) >> 18) as usize;
-        loop {
-            match self.entries[slot] {
-                FREE => return Err(slot),
-                entry if entry & 0xF_FFFF == key => return Ok((entry >> 20) as u16),
-                _ => slot = (slot + 1) % SLOTS,
-            }
-        }
-    }
+/// Packs indices as they come.
+struct Packer {
+    writer: Writer,
+    /// Strings that were seen: a string's code and the index that follows it, above them the code of both. Open addressing.
+    strings: Box<[u32; SLOTS]>,
+    /// The code of what was pushed and not written yet.
+    prefix: Option<u16>,
+    next: u16,
+    width: u32,
 }
 
-/// Indices as sub-blocks of LZW codes.
-fn compress(mut indices: impl Iterator<Item = u8>) -> Vec<u8> {
-    let mut writer = Writer { bytes: vec![0], block: 0, bits: 0, filled: 0 };
-    let mut strings = Strings { entries: vec![FREE; SLOTS] };
-    let (mut next, mut width) = (END + 1, 9);
-    writer.put(RESET, width);
-    let Some(first) = indices.next() else {
-        writer.put(END, width);
-        return writer.finish();
-    };
-    let mut prefix = u16::from(first);
-    for index in indices {
-        let slot = match strings.find(prefix, index) {
-            Ok(code) => {
-                prefix = code;
-                continue;
-            }
-            Err(slot) => slot,
+impl Packer {
+    fn new() -> Self {
+        let mut writer = Writer { bytes: vec![0], block: 0, bits: 0, filled: 0 };
+        writer.put(RESET, 9);
+        Self { writer, strings: Box::new([FREE; SLOTS]), prefix: None, next: END + 1, width: 9 }
+    }
+
+    #[inline(always)]
+    fn push(&mut self, index: u8) {
+        let Some(prefix) = self.prefix else {
+            self.prefix = Some(u16::from(index));
+            return;
         };
-        writer.put(prefix, width);
-        if next < CODES {
-            strings.entries[slot] = (u32::from(next) << 20) | (u32::from(prefix) << 8) | u32::from(index);
-            // The decoder is one code behind, so a width serves one code longer than it holds.
-            if next == 1 << width {
-                width += 1;
+        let key = (u32::from(prefix) << 8) | u32::from(index);
+        let mut slot = (key.wrapping_mul(0x9E37_79B1) >> 18) as usize % SLOTS;
+        loop {
+            let entry = self.strings[slot];
+            if entry == FREE {
+                break;
             }
-            next += 1;
-        } else {
-            writer.put(RESET, width);
-            strings.entries.fill(FREE);
-            (next, width) = (END + 1, 9);
+            if entry & 0xF_FFFF == key {
+                self.prefix = Some((entry >> 20) as u16);
+                return;
+            }
+            slot = (slot + 1) % SLOTS;
         }
-        prefix = u16::from(index);
+        self.add(prefix, slot, key);
+        self.prefix = Some(u16::from(index));
     }
-    writer.put(prefix, width);
-    // The decoder has added an entry since: its width may have grown.
-    if next == 1 << width && width < 12 {
-        width += 1;
+
+    /// Writes a known string and remembers it with the index that ended it.
+    fn add(&mut self, known: u16, slot: usize, key: u32) {
+        self.writer.put(known, self.width);
+        if self.next < CODES {
+            self.strings[slot] = (u32::from(self.next) << 20) | key;
+            // The decoder is one code behind, so a width serves one code longer than it holds.
+            if self.next == 1 << self.width {
+                self.width += 1;
+            }
+            self.next += 1;
+        } else {
+            self.writer.put(RESET, self.width);
+            self.strings.fill(FREE);
+            (self.next, self.width) = (END + 1, 9);
+        }
     }
-    writer.put(END, width);
-    writer.finish()
+
+    fn finish(mut self) -> Vec<u8> {
+        if let Some(prefix) = self.prefix {
+            self.writer.put(prefix, self.width);
+            // The decoder has added an entry since: its width may have grown.
+            if self.next == 1 << self.width && self.width < 12 {
+                self.width += 1;
+            }
+        }
+        self.writer.put(END, self.width);
+        self.writer.finish()
+    }
 }
 
 #[cfg(test)]
@@ -259,7 +272,9 @@ mod tests {
         for kinds in [1, 2, 3, 200, 255] {
             for count in [1, 2, 3, 255, 256, 3838, 3839, 3840, 5000, 60_000] {
                 let indices = noise(count, kinds);
-                assert_eq!(expand(&compress(indices.iter().copied())), indices, "{kinds} kinds, {count}");
+                let mut packer = Packer::new();
+                indices.iter().for_each(|&index| packer.push(index));
+                assert_eq!(expand(&packer.finish()), indices, "{kinds} kinds, {count}");
             }
         }
     }

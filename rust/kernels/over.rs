@@ -30,6 +30,12 @@ pub fn over_ground(drawn: &[[u8; 4]], ground: &[[u8; 3]], out: &mut [[u8; 3]]) -
 /// One pixel, rounded to the nearest.
 #[inline(always)]
 fn mixed(&[red, green, blue, alpha]: &[u8; 4], below: [u8; 3]) -> [u8; 3] {
+    // Most pixels are one or the other.
+    match alpha {
+        0 => return below,
+        255 => return [red, green, blue],
+        _ => (),
+    }
     let cover = u32::from(alpha);
     let mix = |upper: u8, lower: u8| {
         let sum = u32::from(upper) * cover + u32::from(lower) * (255 - cover) + 128;

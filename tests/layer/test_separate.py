@@ -76,6 +76,17 @@ def test_measuring_moves_nothing():
     assert found.before.max() > 0.1
 
 
+def test_clearance_leaves_room_for_cloth():
+    boxes, matrices, marks, depths = scene(gap=0.25)
+    tight = separate_volumes(boxes, matrices, marks, depths, LIMBS, NAMES)
+    roomy = separate_volumes(boxes, matrices, marks, depths, LIMBS, NAMES, clearance=0.05)
+    np.testing.assert_array_equal(tight.depths, depths)
+    assert overlap(placed(boxes, matrices, marks, roomy.depths), 1, 2) < -0.04
+    assert not roomy.before.any()
+    with pytest.raises(ValueError, match="clearance"):
+        separate_volumes(boxes, matrices, marks, depths, LIMBS, NAMES, clearance=-1)
+
+
 def test_the_order_does_not_flip_while_limbs_touch():
     boxes, matrices, marks, depths = scene(frames=9, gap=0.03)
     depths[4, 4:] = 3.98

@@ -194,6 +194,16 @@ def test_squash_and_stretch_are_kept_or_removed():
         assert_allclose(spans(refined(drawn, truth, camera)), np.broadcast_to(LENGTHS, (40, 10)), atol=1e-9)
 
 
+@pytest.mark.parametrize("lengths", [LENGTHS, None])
+def test_a_figure_that_squashes_is_believed_less_where_it_foreshortens(lengths):
+    clip = swinging(15, 60)
+    squashed = clip[:, :1] + (clip - clip[:, :1]) * (1 + 0.07 * np.sin(np.arange(60) / 4))[:, None, None]
+    drawn = SIDE.project(squashed)
+    soft, hard = (off(refined(drawn, clip, SIDE, lengths, noise=noise), squashed) for noise in (None, 0))
+    assert soft < 0.05
+    assert soft < 0.7 * hard
+
+
 @pytest.mark.parametrize("frames", [0, 1, 2, 3, 4, 5])
 def test_short_sequences(frames):
     clip = swinging(14, frames)

@@ -30,7 +30,7 @@ def test_from_the_front_all_is_one_layer():
 def test_from_the_side_there_are_four(azimuth, near, far):
     plan, layers, limbs = cut(figure(azimuth))
     assert plan.names == (f"{near} arm", "body", f"{far} leg", f"{far} arm")
-    assert [limb.name for limb in limbs][0].startswith(near)
+    assert limbs[0].name.startswith(near)
     assert sum(layer.parent < 0 for layer in layers) == 1
     for layer in layers:
         assert not (layer.drawn & ~layer.region).any()

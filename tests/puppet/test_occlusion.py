@@ -17,8 +17,8 @@ def crossing(depths):
     return poses
 
 
-def pieces(layers=(0, 1), radii=(20, 20)):
-    return Pieces(np.array([0, 1]), np.array([0, 1]), np.array(layers), np.array(radii, float))
+def pieces(layers=(0, 1), radii=(20, 20), kinds=(0, 0)):
+    return Pieces(np.array([0, 1]), np.array([0, 1]), np.array(layers), np.array(radii, float), np.array(kinds))
 
 
 @pytest.mark.parametrize("layers", [(0, 1), (1, 0)])
@@ -41,6 +41,17 @@ def test_what_the_first_frame_does_not_tell_is_as_drawn():
     assert piece_ranks(pieces((1, 0)), BONES, camera(), level)[:, 0].tolist() == [0, 0, 0]
 
 
+@pytest.mark.parametrize("kinds", [(1, 2), (2, 1)])
+def test_an_arm_beside_the_body_stays_as_drawn(kinds):
+    depths = [0.0, -0.04, 0.04, -0.2, 0.2]
+    ranks = piece_ranks(pieces((0, 1), kinds=kinds), BONES, camera(), crossing(depths))
+    assert ranks[:, 0].tolist() == [1, 1, 1, 0, 1]
+    ranks = piece_ranks(pieces((1, 0), kinds=kinds), BONES, camera(), crossing(depths))
+    assert ranks[:, 0].tolist() == [0, 0, 0, 0, 1]
+    both = piece_ranks(pieces((0, 1), kinds=(2, 2)), BONES, camera(), crossing(depths))
+    assert both[:, 0].tolist() == [1, 0, 1, 0, 1]
+
+
 def test_where_nothing_is_covered_the_order_is_free_to_change():
     behind, cover = np.array([[0.5], [-0.01], [-0.01]]), np.array([[True], [False], [True]])
     assert settle(behind, cover, 0.02, np.array([True]))[:, 0].tolist() == [True, False, False]
@@ -56,13 +67,13 @@ def test_an_order_that_goes_round_is_still_an_order():
         along = end - start
         poses[0, 2 * bone, :2], poses[0, 2 * bone + 1, :2] = start - 0.2 * along, end + 0.2 * along
         poses[0, 2 * bone : 2 * bone + 2, 2] = 0.2, -0.2
-    three = Pieces(np.arange(3), np.arange(3), np.zeros(3, int), np.full(3, 5.0))
+    three = Pieces(np.arange(3), np.arange(3), np.zeros(3, int), np.full(3, 5.0), np.zeros(3, int))
     ranks = piece_ranks(three, bones, camera(), poses)
     assert sorted(ranks[0].tolist()) == [0, 1, 2]
 
 
 def test_pieces_without_a_bone_keep_to_their_layer():
-    three = Pieces(np.arange(3), np.array([0, -1, 1]), np.array([0, 1, 2]), np.full(3, 5.0))
+    three = Pieces(np.arange(3), np.array([0, -1, 1]), np.array([0, 1, 2]), np.full(3, 5.0), np.zeros(3, int))
     ranks = piece_ranks(three, BONES, camera(), crossing([0.3]))
     assert ranks[0].tolist() == [2, 1, 0]
     assert piece_ranks(three, BONES, camera(), crossing([])).shape == (0, 3)
@@ -90,6 +101,6 @@ def test_where_a_limb_hangs_on_another_layer_the_order_stays_as_drawn(layers, ra
     poses = np.zeros((2, 4, 3))
     poses[:, :, :2] = [[0, 1], [0, 0.6], [0.1, 0.3], [0.1, 0]]
     poses[:, 2:, 2] = np.array([[0.5], [-0.5]])
-    coat_and_thigh = Pieces(np.arange(2), np.array([1, 2]), np.array(layers)[1:], np.full(2, 50.0))
+    coat_and_thigh = Pieces(np.arange(2), np.array([1, 2]), np.array(layers)[1:], np.full(2, 50.0), np.zeros(2, int))
     found = piece_ranks(coat_and_thigh, bones, camera(), poses)
     assert found.tolist() == [ranks, ranks]

@@ -16,7 +16,7 @@ def overlap(a, b):
 
 def before_a_wall(source):
     """The figure before a wall of another colour, with grain."""
-    wall = np.full(source.mask.shape + (3,), (120, 130, 90), np.uint8)
+    wall = np.full((*source.mask.shape, 3), (120, 130, 90), np.uint8)
     wall[200:] = (90, 80, 70)
     image = np.where(source.mask[..., None], source.image[..., :3], wall).astype(int)
     image += RNG.integers(-12, 13, image.shape)

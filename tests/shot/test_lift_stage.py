@@ -13,6 +13,7 @@ from pegbar.io.alignment import read_alignment
 from pegbar.io.bvh import write_bvh
 from pegbar.sample.shot import write_sample
 from pegbar.scene.body import MARKERS, bones_between
+from pegbar.shot import lift_stage
 from tests.export.test_gltf import Played
 from tests.motions import OFFSETS, PARENTS, swaying
 
@@ -79,8 +80,9 @@ def test_nothing_is_done_twice(made, capsys):
 
 
 @pytest.fixture
-def again(made):
-    """Lift the shot again with other lines in its [lift] section; returns the folder of the results."""
+def again(made, monkeypatch):
+    """Lift the shot again with other lines in its [lift] section, without a sheet; returns the results' folder."""
+    monkeypatch.setattr(lift_stage, "lift_sheet", lambda *_: np.zeros((2, 2, 3), np.uint8))
     text = made.read_text()
 
     def lift(lines, code=0):
@@ -169,7 +171,6 @@ def test_another_skeleton_is_posed_at_its_own_size(made, again, capsys):
     assert posed.names == rig.names
     thigh = np.linalg.norm(posed.positions[:, 4] - posed.positions[:, 3], axis=1)
     report = json.loads((folder / "report.json").read_text())
-    # read_motion takes the smallish rig for a person of 1.7 m in another unit: only proportions are sure.
     shin = np.linalg.norm(posed.positions[:, 5] - posed.positions[:, 4], axis=1)
     np.testing.assert_allclose(shin / thigh, np.linalg.norm(OFFSETS[5]) / np.linalg.norm(OFFSETS[4]), rtol=1e-3)
     names, markers, _ = markers_of(folder)
@@ -231,6 +232,15 @@ def test_squash_and_stretch_is_kept_as_lengths_of_bones(again):
     assert np.ptp(held["bone_scales"][:, joint]) > 0.01
 
 
+def shot_with(made, clip, output):
+    """The same shot with another [clip], in a file of its own."""
+    shot = made.parent / f"{output}.toml"
+    text = made.read_text().replace('path = "clip.bvh"', clip).split("[lift]")[0]
+    align = f'[align]\noutput = "{output}/align"\nmode = "static"\nfield_of_view = 40\n'
+    shot.write_text(f'{text}[lift]\noutput = "{output}"\npreview = "none"\n{align}')
+    return shot
+
+
 @pytest.mark.parametrize(
     ("change", "code", "said"),
     [
@@ -239,28 +249,24 @@ def test_squash_and_stretch_is_kept_as_lengths_of_bones(again):
     ],
     ids=["one frame", "all poses equal"],
 )
-def test_a_clip_that_says_too_little_is_named(made, capsys, change, code, said):
+def test_a_clip_that_says_too_little_is_named(made, again, capsys, change, code, said):
     folder = made.parent
     write_bvh(folder / "one.bvh", change(read_motion(folder / "clip.bvh")))
-    other = folder / "other.toml"
-    text = made.read_text().replace('path = "clip.bvh"', 'path = "one.bvh"').split("[lift]")[0]
-    other.write_text(text + '[lift]\noutput = "bad"\npreview = "none"\n[align]\noutput = "bad/align"\n')
+    other = shot_with(made, 'path = "one.bvh"', "bad")
     assert main(["lift", str(other)]) == code
     assert said in capsys.readouterr().err
     if code == 0:
         assert np.isfinite(read_motion(folder / "bad/animation.bvh").positions).all()
 
 
-def test_a_joint_that_the_clip_lacks_is_said_and_left_out(made, capsys):
+def test_a_joint_that_the_clip_lacks_is_said_and_left_out(made, again, capsys):
     folder = made.parent
     clip = read_motion(folder / "clip.bvh")
     write_bvh(
         folder / "bald.bvh", dataclasses.replace(clip, names=tuple(name.replace("head", "x") for name in clip.names))
     )
     (folder / "joints.toml").write_text('head = ""\n')
-    other = folder / "lacking.toml"
-    text = made.read_text().replace('path = "clip.bvh"', 'path = "bald.bvh"\njoints = "joints.toml"').split("[lift]")[0]
-    other.write_text(text + '[lift]\noutput = "lack"\npreview = "none"\n[align]\noutput = "lack/align"\n')
+    other = shot_with(made, 'path = "bald.bvh"\njoints = "joints.toml"', "lack")
     code = main(["lift", str(other)])
     errors = capsys.readouterr().err
     assert code == 0, errors

@@ -75,7 +75,9 @@ def test_a_broken_kept_file_is_made_anew(tmp_path):
     for path in keep.glob("*.npz"):
         size = path.stat().st_size
         path.write_bytes(b"x" * size)
-    same(kept_puppet(picture, clip(), keep=keep, options=FLAT), first)
+    again = kept_puppet(picture, clip(), keep=keep, options=FLAT)
+    same(again, first)
+    assert all(path.read_bytes()[:2] == b"PK" for path in keep.glob("*.npz"))
 
 
 def test_nothing_is_kept_where_nothing_is_to_be(tmp_path):

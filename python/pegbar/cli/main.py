@@ -68,10 +68,19 @@ Example: pegbar align my_shot/shot.toml""",
     "lift": """Make a 3D animation of a drawn sequence, with the artist's poses and timing.
 
 Aligns the shot first where that is out of date. Writes a skeleton posed as drawn (BVH, glTF, USD), the 3D markers
-(CSV, npz), a sheet and an animation to look at, and a report. The shot file's [lift] chooses the skeleton (the clip's or
-your rig's), the frame rate, loops, standing feet, held joints, and limbs whose depth is to be turned.
+(CSV, npz), a sheet and an animation to look at, and a report. The shot file's [lift] chooses the skeleton (the clip's
+or your rig's), the frame rate, loops, standing feet, held joints, and limbs whose depth is to be turned.
 
 Example: pegbar lift my_shot/shot.toml""",
+    "secondary": """Add cloth and balls that collide with the drawn character: secondary motion, to finished frames.
+
+Aligns the shot where that is needed and out of date, finds limb boxes and collision volumes, simulates what the shot
+file's [secondary] section names, renders it, and composites it with the drawings in depth order. Only what is out of
+date is done again. Leaves passes, finished frames, an animation, a contact sheet and a report.
+
+Example: pegbar secondary my_shot/shot.toml
+
+Example: pegbar secondary my_shot/shot.toml --frames 1-24""",
     "animate": """Let a drawn or photographed figure perform a motion capture clip.
 
 Joints are found beside the picture: AnimatedDrawings' char_cfg.yaml, our annotations or COCO keypoints; a mask as well.

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pegbar import arrays
 from pegbar.io import atomic
+from pegbar.io.apng import write_apng
 from pegbar.io.gif import write_gif
 
 _SUFFIXES = (".png", ".apng", ".webp", ".gif")
@@ -28,7 +29,7 @@ def write_animation(path: str | os.PathLike[str], frames: Iterable[ArrayLike], f
     path : path
         .png or .apng (APNG, exact), .webp (lossless) or .gif (256 colours, alpha on or off).
     frames : iterable of (H, W, 3|4) uint8
-        RGB or straight RGBA pictures of one size. All are held in memory, but for a GIF.
+        RGB or straight RGBA pictures of one size, taken as they come; all are held in memory for a WebP.
     frame_rate : float
         Frames a second. Times are whole milliseconds (GIF: hundredths) and do not drift.
 
@@ -47,6 +48,9 @@ def write_animation(path: str | os.PathLike[str], frames: Iterable[ArrayLike], f
     if suffix == ".gif":
         write_gif(path, frames, (duration // 10 for duration in _durations(frame_rate, 10)))
         return
+    if suffix in (".png", ".apng"):
+        write_apng(path, frames, _durations(frame_rate, 1))
+        return
     pictures: list[NDArray[Any]] = []
     for index, frame in enumerate(frames):
         picture = arrays.image(f"frames[{index}]", frame)
@@ -58,8 +62,7 @@ def write_animation(path: str | os.PathLike[str], frames: Iterable[ArrayLike], f
     animation = cv2.Animation()
     animation.frames = pictures
     animation.durations = list(itertools.islice(_durations(frame_rate, 1), len(pictures)))
-    options = [cv2.IMWRITE_WEBP_QUALITY, 101] if suffix == ".webp" else []
-    good, encoded = cv2.imencodeanimation(".png" if suffix == ".apng" else suffix, animation, options)
+    good, encoded = cv2.imencodeanimation(".webp", animation, [cv2.IMWRITE_WEBP_QUALITY, 101])
     if not good:
         raise ValueError(f"frames: OpenCV cannot write {len(pictures)} pictures of {pictures[0].shape} as {suffix}")
     atomic.write_bytes(path, encoded.data)

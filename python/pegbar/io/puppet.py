@@ -60,7 +60,6 @@ def write_figure(path: _Path, figure: PuppetInput) -> None:
         "kind": _FIGURE,
         "names": figure.names,
         "drives": dict(figure.drives),
-        "photo": figure.photo,
     }
     words |= {"notes": figure.notes, "limbs": [[limb.name, limb.start, limb.end, limb.color] for limb in figure.limbs]}
     arrays = _arrays(figure)

@@ -13,7 +13,7 @@ from pegbar.errors import FormatError
 from pegbar.io.annotations import read_annotations
 from pegbar.io.frames import read_picture
 from pegbar.scene.drawing import Drawing
-from pegbar.scene.drawn_skeleton import drawn_skeleton
+from pegbar.scene.drawn_skeleton import DrawnSkeleton, drawn_skeleton
 from pegbar.scene.puppet_input import PuppetInput
 
 _Path = str | os.PathLike[str]
@@ -82,13 +82,7 @@ def read_puppet_input(
     if drawing.image_size != (image.shape[1], image.shape[0]):
         wanted = f"{drawing.image_size[0]} x {drawing.image_size[1]}"
         raise FormatError(given, f"is {image.shape[1]} x {image.shape[0]} pixels; its joints are of {wanted}")
-    parents = {limb.end: limb.start for limb in drawing.limbs}
-    try:
-        skeleton = drawn_skeleton(drawing.names, drawing.markers[place], drawing.visible[place], parents, map)
-    except ValueError as error:
-        if str(error).startswith("map:"):
-            raise
-        raise FormatError(joints, str(error)) from None
+    skeleton = _skeleton(Path(joints), drawing, place, map)
     return PuppetInput(
         image=image,
         mask=silhouette,
@@ -98,7 +92,6 @@ def read_puppet_input(
         bones=skeleton.bones,
         drives=skeleton.drives,
         source=str(given),
-        photo=given.suffix.lower() in (".jpg", ".jpeg") and silhouette is None,
         notes=skeleton.notes,
         segmentation=_segmentation(drawing, place, image),
         limbs=tuple(limb for limb in drawing.limbs if limb.color is not None),
@@ -113,6 +106,16 @@ def _frame(drawing: Drawing, picture: Path | None, frame: int | None) -> int:
         return frame
     names = [path.name for path in drawing.images]
     return names.index(picture.name) if picture is not None and picture.name in names else 0
+
+
+def _skeleton(joints: Path, drawing: Drawing, place: int, map: Mapping[str, str] | None) -> DrawnSkeleton:
+    parents = {limb.end: limb.start for limb in drawing.limbs}
+    try:
+        return drawn_skeleton(drawing.names, drawing.markers[place], drawing.visible[place], parents, map)
+    except ValueError as error:
+        if str(error).startswith("map:"):
+            raise
+        raise FormatError(joints, str(error)) from None
 
 
 def _segmentation(drawing: Drawing, place: int, image: NDArray[np.uint8]) -> NDArray[np.uint8] | None:

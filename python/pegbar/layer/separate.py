@@ -47,6 +47,7 @@ def separate_volumes(
     limbs: ArrayLike,
     names: Sequence[str],
     *,
+    clearance: float = 0.0,
     measure_only: bool = False,
 ) -> Separated:
     """Move markers along their rays until limbs that are not joined do not run into each other.
@@ -68,6 +69,8 @@ def separate_volumes(
         Each limb's two markers.
     names : sequence of N str
         The markers' names.
+    clearance : float
+        Metres that are left between limbs that are moved apart: room for cloth.
     measure_only : bool
         Move nothing, say how deep volumes overlap.
 
@@ -97,10 +100,12 @@ def separate_volumes(
     start = arrays.floats("depths", depths, marks.shape[:2], allow="nan")
     pairs = arrays.integers("limbs", limbs, ("V", 2), low=0, high=len(names) - 1)
     corners = arrays.floats("boxes", boxes, (len(marks), len(pairs), 4, 2), allow="nan")
-    body = _Body(corners, matrices, marks, pairs, names)
+    if not (np.isfinite(clearance) and clearance >= 0):
+        raise ValueError(f"clearance: want metres of 0 or more, got {clearance}")
+    body = _Body(corners, matrices, marks, pairs, names, clearance)
     before, _ = body.overlaps(start)
-    deepest = _deepest(before)
-    if measure_only or not (deepest > 0).any():
+    deepest = _deepest(before - clearance)
+    if measure_only or not (before > 0).any():
         return Separated(start, deepest, deepest)
     order = body.order(start, before)
     moved = start.copy()
@@ -112,32 +117,40 @@ def separate_volumes(
     for _ in range(2 * _SWEEPS):
         moved = body.pushed(moved, order)
     after, _ = body.overlaps(moved)
-    return Separated(moved, deepest, _deepest(after))
+    return Separated(moved, deepest, _deepest(after - clearance))
 
 
 def _deepest(overlaps: Floats) -> Floats:
-    return np.asarray(np.nan_to_num(overlaps, nan=0.0).max(axis=1, initial=0.0))
+    known = np.nan_to_num(overlaps, nan=0.0, neginf=0.0)
+    return np.asarray(known.max(axis=1, initial=0.0))
 
 
 class _Body:
     """The limbs of a drawn character as functions of its markers' depths."""
 
     def __init__(
-        self, boxes: Floats, matrices: Floats, marks: Floats, limbs: NDArray[np.int64], names: Sequence[str]
+        self,
+        boxes: Floats,
+        matrices: Floats,
+        marks: Floats,
+        limbs: NDArray[np.int64],
+        names: Sequence[str],
+        clearance: float,
     ) -> None:
+        self.clearance = clearance
         self.boxes, self.matrices, self.limbs = boxes, matrices, limbs
         self.centres, self.rays = camera_rays(marks, matrices)
         self.first, self.second = _free_pairs(limbs, names)
         self.ease = np.array([1.0 if name in _TRUNK else _LIGHT for name in names])
 
     def overlaps(self, depths: Floats) -> tuple[Floats, tuple[Floats, ...]]:
-        """How deep each pair of limbs overlaps (F, P), and where: stations, depth between, depth that is needed."""
+        """How deep each pair overlaps or lacks clearance (F, P), and where: stations, depth between, depth needed."""
         points = self.centres[:, None] + depths[..., None] * self.rays
         volumes = collision_volumes(self.boxes, self.matrices, points, self.limbs)
         axis = volumes.start[:, :, None] + STATIONS[:, None] * (volumes.end - volumes.start)[:, :, None]
         radii = volumes.start_radius[..., None] + STATIONS * (volumes.end_radius - volumes.start_radius)[..., None]
         apart = axis[:, self.second, None, :] - axis[:, self.first, :, None]
-        wide = radii[:, self.second, None, :] + radii[:, self.first, :, None]
+        wide = radii[:, self.second, None, :] + radii[:, self.first, :, None] + self.clearance
         gaps = wide - np.linalg.norm(apart, axis=-1)
         shape = (*gaps.shape[:2], -1)
         deepest = np.where(np.isnan(gaps), -np.inf, gaps).reshape(shape).argmax(axis=2)[..., None]

@@ -29,7 +29,7 @@ def drawn_proportions(points: Floats, prior: Floats, directions: Floats, ends: N
     ``points`` (F, N, 3) are the drawn markers somewhere on their rays of ``directions`` (F, N, 3), ``prior`` (F, N, 3)
     the clip's, ``ends`` (V, 2) the limbs. All have the figure's scale but for those of clearly other proportions.
     """
-    drawn, seen = (_across(markers, directions, ends) for markers in (points, prior))
+    drawn, seen = (across(markers, directions, ends) for markers in (points, prior))
     full = np.linalg.norm(prior[:, ends[:, 1]] - prior[:, ends[:, 0]], axis=-1)
     return Proportions(_scales(_size(drawn), _size(seen), _size(full)), _stretch(drawn, seen, full))
 
@@ -62,11 +62,11 @@ def weighted_median(values: Floats, weights: Floats) -> float:
     return float(np.interp(np.sum(weights) / 2, share, values[order]))
 
 
-def _across(markers: Floats, directions: Floats, ends: NDArray[np.int64]) -> Floats:
-    """Lengths (F, V) of the limbs across the rays of their second markers."""
+def across(markers: Floats, directions: Floats, ends: NDArray[np.int64]) -> Floats:
+    """Return the lengths (F, V) of the limbs ``ends`` (V, 2) across the rays of their second markers."""
     limbs, away = markers[:, ends[:, 1]] - markers[:, ends[:, 0]], directions[:, ends[:, 1]]
-    across = limbs - np.sum(limbs * away, axis=-1, keepdims=True) * away
-    lengths: Floats = np.linalg.norm(across, axis=-1)
+    aside = limbs - np.sum(limbs * away, axis=-1, keepdims=True) * away
+    lengths: Floats = np.linalg.norm(aside, axis=-1)
     return lengths
 
 

@@ -18,7 +18,7 @@ from pegbar.lift.hinges import breaks, hinge
 from pegbar.lift.lengths import Drawn, clip_lengths, likely_lengths
 from pegbar.lift.pins import meet_lengths, planted_targets
 from pegbar.lift.projection import known
-from pegbar.lift.proportions import drawn_proportions, weighted_median
+from pegbar.lift.proportions import across, drawn_proportions, weighted_median
 from pegbar.lift.rays import fill_marks, mark_noise, metres_per_unit, project, sight_rays, smooth_marks
 from pegbar.lift.rigid import LimbTracks, rigid_limbs
 from pegbar.scene.limb_tree import Link, limb_tree
@@ -41,6 +41,8 @@ SQUASH = 2.0
 
 #: Drawn lengths change this much (relative) over time because poses differ from the clip's.
 POSE = 0.03
+#: A limb drawn longer than this part of its told length lies in the picture; changes below the second are noise.
+FLAT, LEAST_CHANGE = 0.9, 0.02
 #: Metres.
 NO_LENGTH = 1e-4
 
@@ -119,9 +121,10 @@ def _start(given: Given, links: list[Link], options: Refinement) -> _Figure:
     scales[ends[:, 1]] = drawn_as.scales
     if lengths is not None:
         scales[ends[:, 1]] = _told_scales(scales[ends[:, 1]], prior, links, lengths)
-    # Rigid limbs of lengths that are told do not change; of lengths to be found, only as far as poses do not explain.
-    stretch = drawn_as.stretch
-    change = stretch if options.stretch else 0.0 if lengths is not None else math.sqrt(max(stretch**2 - POSE**2, 0))
+    # Limbs of lengths that are told change as far as they are drawn too long; others as far as poses do not explain.
+    stretch, unexplained = drawn_as.stretch, math.sqrt(max(drawn_as.stretch**2 - POSE**2, 0))
+    told = 0.0 if lengths is None else _beyond(points, smooth[1], noise, links, lengths)
+    change = stretch if options.stretch else unexplained if lengths is None else told
     return _Figure(
         points,
         prior,
@@ -133,6 +136,21 @@ def _start(given: Given, links: list[Link], options: Refinement) -> _Figure:
         change,
         {child: parent for parent, child, _ in links},
     )
+
+
+def _beyond(points: Floats, directions: Floats, noise: Floats, links: list[Link], lengths: Floats) -> float:
+    """How much (relative, one deviation) limbs change their length that are drawn longer than told; 0 if hardly any."""
+    known = [(a, b, limb) for a, b, limb in links if limb >= 0]
+    if not known:
+        return 0.0
+    first, second, limbs = np.array(known).T
+    told = np.maximum(lengths[:, limbs], NO_LENGTH)
+    drawn = across(points, directions, np.stack([first, second], axis=1)) / told
+    doubt = 3 * np.hypot(noise[:, first], noise[:, second]) / told
+    # Of limbs that lie in the picture about half are drawn too long: those count for both halves.
+    flat = drawn > FLAT
+    change = math.sqrt(2 * float(np.mean(np.maximum(drawn - doubt - 1, 0)[flat] ** 2))) if flat.any() else 0.0
+    return change if change > LEAST_CHANGE else 0.0
 
 
 def _told_scales(scales: Floats, prior: Floats, links: list[Link], lengths: Floats) -> Floats:
@@ -197,7 +215,7 @@ def _solve_level(figure: _Figure, links: list[Link], lengths: Floats | None, opt
         soft = _soft_depths(level, depths, found, figure.stretch).T
         figure.points[:, level.children] = _onto_rays(here, marked) + soft[..., None] * marked[1]
         return found
-    if figure.change > 0:
+    if figure.change > 0 and options.noise != 0:
         depths = np.ascontiguousarray(_soft_depths(level, depths, found, SQUASH * figure.stretch))
     tracks = LimbTracks(
         across=(_onto_rays(here, marked) - here).swapaxes(0, 1),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,8 +13,10 @@ from pegbar.scene.puppet import Puppet
 
 Floats = NDArray[np.float64]
 Pixels = NDArray[np.uint8]
+# Pictures smaller than this part of the drawing have smaller textures.
+_SMALLER = 0.75
 # Rows between the layers' pictures, so that none is mixed into another.
-_APART = 2
+_APART = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,8 +34,12 @@ class FigurePicture:
     triangles: NDArray[np.int64]
 
     @classmethod
-    def of_puppet(cls, puppet: Puppet) -> FigurePicture:
-        """Put the layers' textures together, each cut to what it shows."""
+    def of_puppet(cls, puppet: Puppet, scale: float = 1.0) -> FigurePicture:
+        """Put the layers' textures together, each cut to what it shows.
+
+        ``scale`` is how large the figure will be drawn: textures for small pictures are made smaller beforehand, so
+        that lines do not break up.
+        """
         keys = np.stack([np.repeat(puppet.triangle_layer, 3), puppet.triangles.ravel()], axis=1)
         corners, triangles = np.unique(keys, axis=0, return_inverse=True)
         coordinates = puppet.vertices[corners[:, 1]].copy()
@@ -54,6 +61,11 @@ class FigurePicture:
         for piece in pieces:
             atlas[row : row + len(piece), : piece.shape[1]] = piece
             row += len(piece) + _APART
+        if scale < _SMALLER:
+            size = tuple(max(1, round(side * scale)) for side in atlas.shape[1::-1])
+            factor = np.array(size) / atlas.shape[1::-1]
+            atlas = np.asarray(cv2.resize(atlas, size, interpolation=cv2.INTER_AREA), np.uint8)
+            coordinates = coordinates * factor + (factor - 1) / 2
         return cls(atlas, corners[:, 1], coordinates, triangles.reshape(-1, 3))
 
     def draw(self, mesh: Floats, depths: Floats, size: tuple[int, int]) -> Pixels:

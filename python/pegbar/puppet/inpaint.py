@@ -54,7 +54,7 @@ def complete(image: Any, hole: Any, method: Method | Completion = "auto", *, sou
     >>> picture = np.full((9, 9, 3), 7, np.uint8)
     >>> hole = np.zeros((9, 9), bool)
     >>> hole[3:6, 3:6] = True
-    >>> np.unique(complete(picture, hole, "diffuse")).tolist()
+    >>> np.unique(complete(picture, hole, "flat")).tolist()
     [7]
     """
     image = arrays.image("image", image, (3,))

@@ -12,14 +12,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pegbar.puppet.bone_weights import bone_distances
+from pegbar.puppet.drawn_pose import LIMB_ENDS
 from pegbar.scene.camera import PerspectiveCamera
 from pegbar.scene.puppet import Puppet
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Ints = NDArray[np.int64]
-#: Share of the figure's size in the depth by which an order must be wrong before it changes.
+#: Share of the figure's height in the depth by which an order must be wrong before it changes.
 HYSTERESIS = 0.02
+#: The same by which an arm must be farther (or nearer) than a bone of the body to go behind (or before) it against the
+#: drawing: a body is thick, and an arm that hangs beside it has about the depth of its middle.
+BODY = 0.05
+_ARM_ENDS = ("elbow", "hand", "wrist")
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,26 +32,31 @@ class Pieces:
     """What keeps together in depth: the triangles of one bone on one layer.
 
     ``of_triangle`` (T,) int is each triangle's piece; ``bones`` (P,) int and ``layers`` (P,) int are a piece's bone (-1
-    none) and layer, ``radii`` (P,) how far its vertices are from the bone in pixels.
+    none) and layer, ``radii`` (P,) how far its vertices are from the bone in pixels. ``kinds`` (P,) int is 1 for the
+    body's, 2 for an arm's and 0 for other pieces.
     """
 
     of_triangle: Ints
     bones: Ints
     layers: Ints
     radii: Floats
+    kinds: Ints
 
     @classmethod
     def of_puppet(cls, puppet: Puppet) -> Pieces:
         """Find the pieces of a puppet."""
         keys = np.stack([puppet.triangle_layer, puppet.triangle_bone], axis=1)
-        kinds, of_triangle = np.unique(keys, axis=0, return_inverse=True)
+        found, of_triangle = np.unique(keys, axis=0, return_inverse=True)
         of_triangle = of_triangle.reshape(-1)
         distances, _ = bone_distances(puppet.vertices, puppet.marks, puppet.bones)
-        radii = np.zeros(len(kinds))
-        for piece, (_, bone) in enumerate(kinds.tolist()):
+        radii, kinds = np.zeros(len(found)), np.zeros(len(found), np.int64)
+        for piece, (_, bone) in enumerate(found.tolist()):
             corners = np.unique(puppet.triangles[of_triangle == piece])
-            radii[piece] = np.percentile(distances[corners, bone], 90) if bone >= 0 else 0.0
-        return cls(of_triangle, kinds[:, 1], kinds[:, 0], radii)
+            if bone >= 0:
+                radii[piece] = np.percentile(distances[corners, bone], 90)
+                end = puppet.drives.get(puppet.names[puppet.bones[bone, 1]], "")
+                kinds[piece] = 2 if end.endswith(_ARM_ENDS) else 0 if end.endswith(LIMB_ENDS) else 1
+        return cls(of_triangle, found[:, 1], found[:, 0], radii, kinds)
 
 
 def piece_ranks(pieces: Pieces, bones: Ints, camera: PerspectiveCamera, poses: Floats) -> Ints:
@@ -72,6 +82,7 @@ def piece_ranks(pieces: Pieces, bones: Ints, camera: PerspectiveCamera, poses: F
     drawn = _drawn_in_front(pieces, bones)[first, second]
     front = np.broadcast_to(drawn, (len(poses), len(first))).copy()
     touching = np.ones(front.shape, bool)
+    behind += BODY * size * _leaning(pieces, drawn, first, second)[known]
     front[:, known] = settle(behind, cover, HYSTERESIS * size, drawn[known])
     touching[:, known] = cover
     relation = np.zeros((len(poses), count, count), np.int8)
@@ -116,6 +127,12 @@ def _crossings(
     middles = [depths[:, pair].mean(axis=2) for pair in ends]
     behind = np.where(meeting, middles[1] - middles[0], behind)
     return behind, distance < pieces.radii[first] + pieces.radii[second]
+
+
+def _leaning(pieces: Pieces, drawn: Flags, first: Ints, second: Ints) -> Floats:
+    """1 where the first of a pair of an arm and a part of the body is drawn in front, -1 where it is behind, else 0."""
+    kinds = np.sort(pieces.kinds[np.stack([first, second])], axis=0)
+    return np.where((kinds[0] == 1) & (kinds[1] == 2), np.where(drawn, 1.0, -1.0), 0.0)
 
 
 def nearest_points(start: Floats, along: Floats, other: Floats, across: Floats) -> tuple[Floats, Floats, Floats]:

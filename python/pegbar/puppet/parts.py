@@ -26,6 +26,8 @@ Labels = NDArray[np.uint8]
 BORDER_COST = 2.0
 #: A limb on the trunk seems as thick as the trunk: no bone is thicker than so many times its chain's thin end.
 _MOST_SWELL = 1.6
+#: A limb lies over a thicker part where the outline is so many half widths away; this share of them is then its own.
+_OVER, _BROAD = 1.25, 0.7
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,15 +52,33 @@ def grow_parts(source: PuppetInput, mask: Flags) -> Parts:
     ways = [bone_way(source.marks[bone], inside) for bone in source.bones]
     radii = _radii(source, ways, inside)
     costs = np.where(mask, 1 + BORDER_COST * borders(source.image, mask), np.inf).astype(np.float32)
-    seeds = np.zeros(mask.shape, np.uint8)
-    limbs = {bone for chain in limb_chains(source.names, source.bones) for bone in chain}
-    # Limbs are drawn over the trunk's bones, which have room elsewhere.
-    for bone in sorted(range(len(source.bones)), key=lambda bone: bone in limbs):
-        seeds[tuple(ways[bone].T)] = bone + 1
+    seeds = _seeds(source, ways, radii, inside)
     grown, _ = _kernels.geodesic_labels(seeds, costs, 1 / radii)
     # Pieces that no bone reaches belong to the nearest region.
     grown = _kernels.grow_labels(grown, mask.view(np.uint8), None)
     return Parts(grown if source.segmentation is None else _painted(source, mask, grown, radii), radii)
+
+
+def _seeds(source: PuppetInput, ways: Sequence[NDArray[np.intp]], radii: Floats, inside: NDArray[np.float32]) -> Labels:
+    """Where the bones' regions begin (H, W): along the bones, and broadly where a limb lies over a thicker part.
+
+    The trunk's bones run under such a limb and grow faster than it does.
+    """
+    seeds = np.zeros(inside.shape, np.uint8)
+    chains = limb_chains(source.names, source.bones)
+    limbs = {bone for chain in chains for bone in chain}
+    for bone in range(len(source.bones)):
+        if bone not in limbs:
+            seeds[tuple(ways[bone].T)] = bone + 1
+    for chain in chains:
+        for bone in chain:
+            way = ways[bone][len(ways[bone]) // 3 :] if bone == chain[0] else ways[bone]
+            for row, column in way[inside[tuple(way.T)] > _OVER * radii[bone]]:
+                cv2.circle(seeds, (int(column), int(row)), round(_BROAD * radii[bone]), bone + 1, -1)
+    for bone in limbs:
+        seeds[tuple(ways[bone].T)] = bone + 1
+    seeds[inside == 0] = 0
+    return seeds
 
 
 def _painted(source: PuppetInput, mask: Flags, grown: Labels, radii: Floats) -> Labels:
@@ -108,7 +128,8 @@ def bone_way(ends: Floats, inside: NDArray[np.float32]) -> NDArray[np.intp]:
     while far[tuple(way[-1])] > 0:
         top, left = np.maximum(way[-1] - 1, 0)
         near = far[top : way[-1][0] + 2, left : way[-1][1] + 2]
-        way.append(np.array(np.unravel_index(near.argmin(), near.shape)) + [top, left])
+        row, column = np.unravel_index(near.argmin(), near.shape)
+        way.append(np.array([top + row, left + column]))
     return np.array(way)
 
 

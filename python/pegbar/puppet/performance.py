@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -156,7 +155,7 @@ def perform(puppet: Puppet, motion: Motion | Sequence[Motion], direction: Direct
         pieces=pieces,
         ranks=piece_ranks(pieces, puppet.bones, puppet.camera, poses),
         frame_rate=rate,
-        shift=puppet.camera.project(rest[root] - gone) - puppet.marks[root],
+        shift=puppet.camera.project(rest[root] - gone) - puppet.camera.project(rest[root]),
         notes=notes,
     )
 

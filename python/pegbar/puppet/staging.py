@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from pegbar import _kernels
+from pegbar.ahead import map_ahead
 from pegbar.puppet.drawn_pose import focal_lengths
 from pegbar.puppet.figure_picture import FigurePicture
 from pegbar.puppet.performance import Performance
@@ -107,53 +109,80 @@ class Stage:
 
         A figure whose clip is shorter than another's begins again.
         """
-        figures = [FigurePicture.of_puppet(performance.puppet) for performance in self.performances]
-        for frame in range(start, len(self) if stop is None else stop):
-            ground = self._ground(frame)
-            canvas: Pixels | None = None
-            for index, performance in enumerate(self.performances):
-                own = frame % len(performance)
-                mesh = performance.meshes[own] * self.scales[index] + self.offsets[index]
-                drawn = figures[index].draw(mesh, performance.triangle_depths(own), self.size)
-                if ground is not None:
-                    ground = _kernels.over_ground(drawn, ground)
-                else:
-                    canvas = drawn if canvas is None else put_over(drawn, canvas)
-            finished = ground if ground is not None else canvas
-            assert finished is not None
-            yield finished
+        figures = [
+            FigurePicture.of_puppet(performance.puppet, scale * _growth(performance))
+            for performance, scale in zip(self.performances, self.scales, strict=True)
+        ]
+        frames = range(start, len(self) if stop is None else stop)
+        return map_ahead(lambda frame: self._picture(figures, frame), frames)
 
-    def _ground(self, frame: int) -> Pixels | None:
-        """What is behind the figures (H, W, 3), one pixel (1, 1, 3) for one colour, or None for nothing."""
-        if self.setting.background == "transparent":
-            return None
-        if self.behind is None:
-            return np.array([[self.setting.color]], np.uint8)
+    def _picture(self, figures: Sequence[FigurePicture], frame: int) -> Pixels:
+        canvas = self._ground(frame)
+        for index, performance in enumerate(self.performances):
+            own = frame % len(performance)
+            mesh = performance.meshes[own] * self.scales[index] + self.offsets[index]
+            # Only the part of the canvas that the figure is on: a whole number of pixels from the corner.
+            low = np.clip(np.floor(mesh.min(axis=0)).astype(int) - 1, 0, self.size)
+            high = np.clip(np.ceil(mesh.max(axis=0)).astype(int) + 2, 0, self.size)
+            width, height = (high - low).tolist()
+            if width < 1 or height < 1:
+                continue
+            drawn = figures[index].draw(mesh - low, performance.triangle_depths(own), (width, height))
+            part = canvas[low[1] : high[1], low[0] : high[0]]
+            part[...] = put_over(drawn, part) if self.setting.background == "transparent" else over(drawn, part)
+        return canvas
+
+    def _ground(self, frame: int) -> Pixels:
+        """What is behind the figures: (H, W, 3), or (H, W, 4) and empty."""
         first = self.performances[0]
-        scale, shift = self.scales[0], first.shift[frame % len(first)]
+        shift = first.shift[frame % len(first)]
+        if self.setting.background == "transparent":
+            return np.zeros((self.size[1], self.size[0], 4), np.uint8)
+        if self.behind is None or not shift.any():
+            return self._still.copy()
+        # A camera that follows leaves the picture: its rim goes on.
+        return self._seen(self.behind, shift, cv2.BORDER_REPLICATE)
+
+    @cached_property
+    def _still(self) -> Pixels:
+        """What is behind the figures where the camera stands still."""
+        if self.behind is None:
+            return np.asarray(np.full((self.size[1], self.size[0], 3), self.setting.color, np.uint8))
+        whole = np.array(self.behind.shape[1::-1]) * self.scales[0]
+        if self.scales[0] < 1 and np.allclose(whole, self.size, atol=1):
+            return np.asarray(cv2.resize(self.behind, self.size, interpolation=cv2.INTER_AREA), np.uint8)
+        return self._seen(self.behind, np.zeros(2), cv2.BORDER_CONSTANT)
+
+    def _seen(self, picture: Pixels, shift: Floats, rim: int) -> Pixels:
+        scale = self.scales[0]
         move = np.array([[scale, 0, 0], [0, scale, 0]])
         move[:, 2] = self.offsets[0] + scale * shift
-        smooth = cv2.INTER_LINEAR if scale >= 1 else cv2.INTER_AREA
-        if not shift.any() and scale < 1 and np.allclose(np.array(self.behind.shape[1::-1]) * scale, self.size, atol=1):
-            return np.asarray(cv2.resize(self.behind, self.size, interpolation=smooth), np.uint8)
-        warped = cv2.warpAffine(self.behind, move, self.size, flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        color = self.setting.color
+        warped = cv2.warpAffine(picture, move, self.size, flags=cv2.INTER_LINEAR, borderMode=rim, borderValue=color)
         return np.asarray(warped, np.uint8)
 
 
+def over(drawn: Pixels, ground: Pixels) -> Pixels:
+    """Return ``drawn`` (H, W, 4), straight alpha, over ``ground`` (H, W, 3)."""
+    return _kernels.over_ground(drawn, np.ascontiguousarray(ground))
+
+
 def put_over(drawn: Pixels, ground: Pixels) -> Pixels:
-    """Put ``drawn`` (H, W, 4) over ``ground`` (H, W, 4), both with straight alpha, in place."""
-    rows, columns = np.flatnonzero(drawn[..., 3].any(axis=1)), np.flatnonzero(drawn[..., 3].any(axis=0))
-    if not len(rows):
-        return ground
-    part = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    upper, lower = drawn[part], ground[part]
-    alpha = upper[..., 3:].astype(np.uint16)
-    under = lower[..., 3:].astype(np.uint16) * (255 - alpha) // 255
+    """Return ``drawn`` over ``ground``, both (H, W, 4) with straight alpha."""
+    if not ground[..., 3].any():
+        return drawn
+    alpha = drawn[..., 3:].astype(np.uint16)
+    under = ground[..., 3:].astype(np.uint16) * (255 - alpha) // 255
     total = alpha + under
-    mixed = upper[..., :3].astype(np.uint32) * alpha + lower[..., :3].astype(np.uint32) * under
-    lower[..., :3] = (mixed + total // 2) // np.maximum(total, 1)
-    lower[..., 3:] = total
-    return ground
+    mixed = drawn[..., :3].astype(np.uint32) * alpha + ground[..., :3].astype(np.uint32) * under
+    colors = (mixed + total // 2) // np.maximum(total, 1)
+    return np.asarray(np.concatenate([colors, total], axis=2), np.uint8)
+
+
+def _growth(performance: Performance) -> float:
+    """How much larger than drawn a figure becomes that comes nearer, 1 or more."""
+    heights = np.ptp(performance.meshes[..., 1], axis=1)
+    return max(1.0, float(heights.max() / max(np.ptp(performance.puppet.vertices[:, 1]), 1e-9)))
 
 
 def _behind(performance: Performance, setting: Setting, picture: Pixels | None) -> Pixels | None:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from pegbar.report.canvas import Canvas
-from pegbar.report.contact_sheet import over_paper
 from pegbar.report.lift_sheet import azimuth_of, draw_bones, lifted_names
 from pegbar.scene.alignment import Alignment
 from pegbar.scene.lifted import Lifted
@@ -24,13 +23,13 @@ _LINE, _INK = (214, 214, 204), (70, 70, 70)
 
 
 def preview_frames(
-    pictures: Sequence[Picture], labels: Sequence[str], alignment: Alignment, lifted: Lifted, shown: Sequence[int]
+    picture: Callable[[int], Picture], labels: Sequence[str], alignment: Alignment, lifted: Lifted, shown: Sequence[int]
 ) -> Iterator[Picture]:
-    """Yield pictures (320, W, 3) uint8: the drawing, faded, under the posed skeleton, and that turning once about.
+    """Yield pictures (320, W, 3) uint8: the drawing, faded, under the posed skeleton; and that, turning once about.
 
-    ``pictures``, ``labels`` are the F drawings and what they are called, ``shown`` (T,) which of them is seen in each
-    picture. On the turntable the floor's lines are half a metre apart and stand still in the world, so that feet that
-    slide are seen to.
+    ``picture`` gives a drawing's picture by its place, ``labels`` (F) name the drawings, ``shown`` (T,) says which of
+    them is seen in each frame. On the turntable the floor's lines are half a metre apart and stand still in the world,
+    so that feet that slide are seen to.
     """
     names = lifted_names(lifted)
     posed = lifted.motion.markers(names)
@@ -38,7 +37,7 @@ def preview_frames(
     size = _scale(posed)
     for place, frame in enumerate(shown):
         if frame not in overlays:
-            overlays = {frame: _overlay(pictures[frame], labels[frame], alignment, posed, names, frame)}
+            overlays = {frame: _overlay(picture(frame), labels[frame], alignment, posed, names, frame)}
         azimuth = azimuth_of(alignment, frame) + 360 * place / len(shown)
         yield np.concatenate([overlays[frame], _turntable(posed, names, frame, azimuth, size)], axis=1)
 
@@ -60,7 +59,7 @@ def _overlay(
     for mark, guessed in zip(alignment.markers[frame, known], alignment.estimated[frame, known], strict=True):
         canvas.circle(scale * mark + (scale - 1) / 2, 3.0, _INK, width=1.0 if guessed else None)
     canvas.text((6, 16), f"drawing {label}", 10, (20, 20, 20))
-    return over_paper(canvas.image())
+    return canvas.image()[..., :3]
 
 
 def _scale(posed: Floats) -> float:
@@ -87,4 +86,4 @@ def _turntable(posed: Floats, names: tuple[str, ...], frame: int, azimuth: float
             canvas.polyline(view.project(ends), 1.0, _LINE)
     places = posed[frame] - middle
     draw_bones(canvas, view.project(places), view.depth(places), names, 5.0)
-    return over_paper(canvas.image())
+    return canvas.image()[..., :3]

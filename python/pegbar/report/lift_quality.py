@@ -33,7 +33,7 @@ def quality(alignment: Alignment, lifted: Lifted, numbers: Sequence[int]) -> dic
     apart = np.linalg.norm(posed - markers, axis=2)
     drawing, joint = np.unravel_index(np.argmax(apart), apart.shape)
     slide = _slides(posed, lifted.planted[:, of_lifted])
-    changes = limb_changes(lifted)
+    changes = limb_changes(lifted.markers, lifted.names, lifted.bones)
     return {
         "drawings": len(posed),
         "marker_reprojection_px": _rms(_picture_errors(alignment, markers, known)),
@@ -55,14 +55,14 @@ def quality(alignment: Alignment, lifted: Lifted, numbers: Sequence[int]) -> dic
     }
 
 
-def limb_changes(lifted: Lifted) -> dict[str, float]:
-    """Return by how much, relative, each limb's length changes over the drawings; limbs by their outer joint."""
+def limb_changes(points: Floats, names: Sequence[str], bones: Sequence[tuple[int, int]]) -> dict[str, float]:
+    """Return by how much, relative, limbs of ``points`` (F, N, 3) change their length; limbs by their outer joint."""
     changes = {}
-    for first, second in lifted.bones:
-        lengths = np.linalg.norm(lifted.markers[:, second] - lifted.markers[:, first], axis=1)
+    for first, second in bones:
+        lengths = np.linalg.norm(points[:, second] - points[:, first], axis=1)
         usual = float(np.median(lengths))
         if usual > 1e-9:
-            changes[lifted.names[second]] = _rms(lengths / usual - 1)
+            changes[names[second]] = _rms(lengths / usual - 1)
     return changes
 
 
@@ -76,7 +76,10 @@ def notes(
     poses = alignment.clip - np.nanmean(alignment.clip, axis=1, keepdims=True)
     if float(np.nanmax(np.ptp(poses, axis=0))) < _STILL:
         found.append("the clip stands still: all depth is that of one pose, and no foot is known to leave the ground")
-    loose = {name: change for name, change in values["limb_length_residuals"].items() if change > RIGID}
+    # At the clip's depth, since rigid limbs have one length whatever is drawn.
+    known = [alignment.names.index(name) for name in lifted.names]
+    drawn = limb_changes(alignment.positions[:, known], lifted.names, lifted.bones)
+    loose = {name: change for name, change in drawn.items() if change > RIGID}
     if loose and not stretch:
         most = sorted(loose, key=lambda name: -loose[name])[:3]
         told = ", ".join(f"to {name} by {loose[name]:.0%}" for name in most)

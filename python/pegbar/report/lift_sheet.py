@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from itertools import islice
+from collections.abc import Callable, Sequence
 
 import cv2
 import numpy as np
@@ -11,7 +10,6 @@ from numpy.typing import NDArray
 
 from pegbar.report.align_overlay import LEFT, MIDDLE, RIGHT
 from pegbar.report.canvas import Canvas
-from pegbar.report.contact_sheet import over_paper
 from pegbar.scene.alignment import Alignment
 from pegbar.scene.body import bones_between
 from pegbar.scene.lifted import Lifted
@@ -25,21 +23,20 @@ _ROWS = 12
 _GREY, _PAPER = (110, 110, 110), (250, 250, 246, 255)
 
 
-def lift_sheet(pictures: Iterable[Picture], labels: Sequence[str], alignment: Alignment, lifted: Lifted) -> Picture:
+def lift_sheet(
+    picture: Callable[[int], Picture], labels: Sequence[str], alignment: Alignment, lifted: Lifted
+) -> Picture:
     """Return rows of (260, W, 3) uint8 for at most 12 drawings: the drawing, the clip, the result from four directions.
 
     The result is the posed skeleton, broad, and the lifted markers, thin: bones that are not as long as drawn part
     from them. The first direction is the drawing's own camera's, level; then the figure is turned by 45 degrees each
-    time. ``labels`` (F) name the drawings.
+    time. ``picture`` gives a drawing's picture by its place, ``labels`` (F) name the drawings.
     """
     count = len(labels)
-    chosen = set(np.unique(np.linspace(0, count - 1, min(_ROWS, count)).round().astype(int)).tolist())
+    chosen = np.unique(np.linspace(0, count - 1, min(_ROWS, count)).round().astype(int)).tolist()
     names = lifted_names(lifted)
     posed = lifted.motion.markers(names)
-    rows = []
-    for frame, picture in enumerate(islice(pictures, count)):
-        if frame in chosen:
-            rows.append(_row(picture, labels[frame], alignment, lifted, (names, posed[frame]), frame))
+    rows = [_row(picture(i), labels[i], alignment, lifted, (names, posed[i]), i) for i in chosen]
     return np.concatenate(rows)
 
 
@@ -77,7 +74,7 @@ def _row(
     drawn.text((6, 16), f"drawing {label}", 10, (20, 20, 20))
     azimuth = azimuth_of(alignment, frame)
     known = [alignment.names.index(name) for name in lifted.names]
-    cells = [over_paper(drawn.image()), _stick("clip", azimuth, (lifted.names, alignment.clip[frame, known], 4.0))]
+    cells = [drawn.image()[..., :3], _stick("clip", azimuth, (lifted.names, alignment.clip[frame, known], 4.0))]
     figures = ((*posed, 5.0), (lifted.names, lifted.markers[frame], 1.5))
     cells += [_stick("result" if turn == 0 else f"turned {turn}", azimuth + turn, *figures) for turn in _TURNS]
     return np.concatenate(cells, axis=1)
@@ -93,4 +90,4 @@ def _stick(label: str, azimuth: float, *figures: tuple[tuple[str, ...], Floats, 
     for names, places, width in figures:
         draw_bones(canvas, view.project(places - middle), view.depth(places - middle), names, width)
     canvas.text((6, 16), label, 10, _GREY)
-    return over_paper(canvas.image())
+    return canvas.image()[..., :3]

@@ -20,7 +20,7 @@ class PuppetInput:
     ``names`` are its J joints, ``marks`` (J, 2) their pixels (NaN where a joint is not marked) and ``visible`` (J,)
     whether they are seen. ``bones`` (B, 2) int are pairs of joints, parent and child, from the root outwards.
     ``drives`` is joint -> the clip's marker that moves it. ``source`` is what to call the picture in messages,
-    ``photo`` whether it is a photo without a mask, ``notes`` what a user should know. ``segmentation`` (H, W, 3) uint8
+    ``notes`` what a user should know. ``segmentation`` (H, W, 3) uint8
     is painted in the colours of ``limbs`` where the drawing comes with one. ``alpha`` (H, W) float32 is the figure's
     coverage, 0 to 1, where it is known better than from picture and mask; ``bone_map`` (H, W) uint8 the bone that each
     pixel belongs to, v + 1 for bone v, and ``radii`` (B,) the bones' half widths in pixels, once they are found.
@@ -35,7 +35,6 @@ class PuppetInput:
     bones: NDArray[np.int64]
     drives: Mapping[str, str] = field(default_factory=dict)
     source: str = "picture"
-    photo: bool = False
     notes: tuple[str, ...] = ()
     segmentation: NDArray[np.uint8] | None = None
     limbs: tuple[Limb, ...] = ()

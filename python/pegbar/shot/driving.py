@@ -17,7 +17,6 @@ from pegbar.scene.camera import metric
 from pegbar.scene.contacts import FEET, ankle_heights, foot_contacts
 from pegbar.scene.drawing import Drawing
 from pegbar.scene.driving import Driving
-from pegbar.scene.volumes import TaperedCylinders
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -34,7 +33,7 @@ def drive(
     clip: Floats | None = None,
     ground: float | None = None,
     frame_rate: float = 24.0,
-    separate: bool = False,
+    clearance: float | None = None,
 ) -> Driving:
     """Put a drawn character into 3D with volumes that fill its drawn limbs (2010, sections 3.1.3 and 3.2).
 
@@ -52,8 +51,8 @@ def drive(
         Height of the ground in metres; None: where the feet stand, and none where none does.
     frame_rate : float
         Drawings a second.
-    separate : bool
-        Move markers in depth until limbs that are not joined do not run into each other.
+    clearance : float, optional
+        Move markers in depth until limbs that are not joined are so many metres apart; None: leave them.
 
     Raises
     ------
@@ -65,24 +64,19 @@ def drive(
     """
     if not drawing.cameras or drawing.depths is None:
         raise ValueError("drawing: want cameras and depths")
-    matrices = metric(np.stack([camera.matrix for camera in drawing.cameras]))
+    matrices = _upright(drawing)
     markers, depths, estimated = _placed(drawing)
-    if np.mean([camera.rotation[1, 1] for camera in drawing.cameras]) > 0:
-        # The world's y points down in the picture: the camera of annotations that know no world.
-        matrices = matrices @ _UPSIDE_DOWN
-    positions = _on_rays(markers, matrices, depths)
-    limbs = drawing.limb_markers.astype(np.int64)
-    limb_names = tuple(limb.name for limb in drawing.limbs)
-    focal = np.array([camera.focal_length for camera in drawing.cameras])
-    scales = focal[:, None] / np.nanmean(np.where(depths > 0, depths, np.nan)[:, limbs], axis=2)
-    scales = np.where(np.isfinite(scales), scales, 1.0)
+    limbs, limb_names = drawing.limb_markers.astype(np.int64), tuple(limb.name for limb in drawing.limbs)
+    scales = _scales(drawing, depths, limbs)
     found = limb_boxes(edges, markers, limbs, given=drawing.boxes, scales=scales, names=limb_names)
-    volumes = _volumes(found, matrices, positions, limbs, numbers, limb_names)
-    apart = separate_volumes(found.boxes, matrices, markers, depths, limbs, drawing.names, measure_only=not separate)
-    if separate:
-        positions = _on_rays(markers, matrices, apart.depths)
-        volumes = collision_volumes(found.boxes, matrices, positions, limbs)
+    _refuse_impossible(found, matrices, _on_rays(markers, matrices, depths), limbs, numbers, limb_names)
+    room, leaves = clearance or 0.0, clearance is None
+    apart = separate_volumes(
+        found.boxes, matrices, markers, depths, limbs, drawing.names, clearance=room, measure_only=leaves
+    )
+    positions = _on_rays(markers, matrices, apart.depths)
     floor, said = (ground, ()) if ground is not None else _ground(drawing, positions, clip, frame_rate)
+    missing = _missing(drawing.names, limb_names, limbs, positions)
     return Driving(
         tuple(numbers),
         drawing.names,
@@ -97,11 +91,29 @@ def drive(
         found.given,
         found.repaired,
         found.measured,
-        volumes,
+        collision_volumes(found.boxes, matrices, positions, limbs),
         floor,
         np.stack([apart.before, apart.after], axis=1),
-        (*_missing(drawing.names, limb_names, limbs, positions), *_mended(found, numbers, limb_names), *said),
+        (*missing, *_mended(found, numbers, limb_names), *said),
     )
+
+
+def _upright(drawing: Drawing) -> Floats:
+    """The cameras' matrices, in a world whose y points up.
+
+    Annotations that know no world have a camera whose own axes are the world's: y points down in the picture.
+    """
+    matrices = metric(np.stack([camera.matrix for camera in drawing.cameras]))
+    down = np.mean([camera.rotation[1, 1] for camera in drawing.cameras]) > 0
+    return matrices @ _UPSIDE_DOWN if down else matrices
+
+
+def _scales(drawing: Drawing, depths: Floats, limbs: NDArray[np.int64]) -> Floats:
+    """Pixels a metre at each limb (D, V); 1 where a depth is not known."""
+    focal = np.array([camera.focal_length for camera in drawing.cameras])
+    ends = np.where(depths > 0, depths, np.nan)[:, limbs].mean(axis=2)
+    scales: Floats = np.where(np.isfinite(ends), focal[:, None] / ends, 1.0)
+    return scales
 
 
 def _on_rays(markers: Floats, matrices: Floats, depths: Floats) -> Floats:
@@ -124,17 +136,17 @@ def _placed(drawing: Drawing) -> tuple[Floats, Floats, Flags]:
     return values[..., :2], values[..., 2], ~(known & drawing.visible)
 
 
-def _volumes(
+def _refuse_impossible(
     found: LimbBoxes,
     matrices: Floats,
     positions: Floats,
     limbs: NDArray[np.int64],
     numbers: Sequence[int],
     names: Sequence[str],
-) -> TaperedCylinders:
-    """The tapered cylinders; what is impossible is named by drawing and limb."""
+) -> None:
+    """Refuse what is impossible, naming drawing and limb."""
     try:
-        return collision_volumes(found.boxes, matrices, positions, limbs)
+        collision_volumes(found.boxes, matrices, positions, limbs)
     except DegenerateError as error:
         said = str(error).removeprefix("boxes: ").split(": ", 1)
         frame, limb = (int(part.split()[1]) for part in said[0].split(", "))

@@ -37,7 +37,7 @@ from pegbar.shot.model import SecondarySection
 from pegbar.shot.plan import Shot, open_shot
 from pegbar.shot.record import fingerprint, is_up_to_date, write_record
 
-VERSION = 2
+VERSION = 3
 _SHEET, _SHEET_WIDTH = 24, 480
 # Outlines beside coloured limbs belong to them, so many pixels at most.
 _OUTLINE = 4.0
@@ -122,7 +122,7 @@ class DrivingStage:
             clip=self._clip(),
             ground=self.section.ground if isinstance(self.section.ground, float) else None,
             frame_rate=self.bare.settings.shot.frame_rate / self._hold(),
-            separate=self.section.separate,
+            clearance=self.section.clearance if self.section.separate else None,
         )
         self.folder.mkdir(parents=True, exist_ok=True)
         write_driving(self.outputs()[0], driving)
@@ -194,7 +194,8 @@ class DrivingStage:
 
     def _recipe(self) -> str:
         settings = self.bare.settings
-        parts: list[Any] = [VERSION, settings.drawing.model_dump(), self.section.ground, self.section.separate]
+        parts: list[Any] = [VERSION, settings.drawing.model_dump(), self.section.ground]
+        parts += [self.section.separate, self.section.clearance]
         parts += [settings.shot.frame_rate, self.numbers, self.is_aligned, self._hold()]
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 

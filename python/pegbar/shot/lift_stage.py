@@ -8,6 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pegbar.io import atomic
 from pegbar.io.animation import write_animation
 from pegbar.io.frames import read_picture, write_image
@@ -140,13 +143,14 @@ class LiftStage:
         film = film_of(lifted, numbers, holds, rate, section)
         for kind in dict.fromkeys(section.formats):
             write_film(self.folder / FILES[kind], kind, film, lifted, section)
-        pictures = [shot.drawings.path(number) for number in numbers]
         labels = [str(number) for number in numbers]
-        write_image(self.folder / "sheet.png", lift_sheet(map(read_picture, pictures), labels, alignment, lifted))
+
+        def picture(place: int) -> NDArray[np.uint8]:
+            return read_picture(shot.drawings.path(numbers[place]))
+
+        write_image(self.folder / "sheet.png", lift_sheet(picture, labels, alignment, lifted))
         if section.preview != "none":
-            _, shown = film_moments(holds, rate, stepped=True, rate=rate, loop=False)
-            step = -(-len(shown) // _PREVIEW)
-            frames = preview_frames(
-                list(map(read_picture, pictures)), labels, alignment, lifted, shown[::step].astype(int).tolist()
-            )
+            _, places = film_moments(holds, rate, stepped=True, rate=rate, loop=False)
+            step = -(-len(places) // _PREVIEW)
+            frames = preview_frames(picture, labels, alignment, lifted, places[::step].astype(int).tolist())
             write_animation(self.folder / f"preview.{section.preview}", frames, rate / step)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from pegbar.align.retime import retime
 from pegbar.lift.angles import joint_angles
 from pegbar.lift.fitting import fit_skeleton
+from pegbar.lift.given import FEWEST_MARKS
 from pegbar.lift.looping import close_loop
 from pegbar.lift.markers import reconstruct_markers
 from pegbar.lift.pins import planted_targets
@@ -52,11 +55,11 @@ def lift_drawing(alignment: Alignment, clip: Motion, rate: float, options: LiftO
     known = np.flatnonzero(np.isfinite(alignment.clip).all(axis=(0, 2)))
     names = tuple(alignment.names[index] for index in known)
     bones = bones_between(names)
-    flips = flip_rows(options.flips, names, bones)
     planted = standing_markers(clip, alignment, known, names, rate, options.planted)
     if options.depth == "lengths":
-        markers = _by_lengths(alignment, known, bones, planted, flips, options)
+        markers = _by_lengths(alignment, known, planted, options)
     else:
+        flips = flip_rows(options.flips, names, bones)
         markers = turn_limbs(alignment.positions[:, known], alignment.matrices, bones, flips, names)
         markers = _led(markers, fixed_places(options.held, markers, names))
     motion, size = _posed(markers, names, bones, retime(clip, alignment.times, frame_rate=rate), options)
@@ -69,33 +72,51 @@ def lift_drawing(alignment: Alignment, clip: Motion, rate: float, options: LiftO
     return Lifted(names, bones, markers, planted, motion, travel, size)
 
 
-def _by_lengths(
-    alignment: Alignment,
-    known: NDArray[np.intp],
-    bones: tuple[tuple[int, int], ...],
-    planted: Flags,
-    flips: list[tuple[int, int, int]],
-    options: LiftOptions,
-) -> Floats:
-    """Markers of limbs of constant length, over the whole sequence at once."""
-    names = tuple(alignment.names[index] for index in known)
+def _by_lengths(alignment: Alignment, known: NDArray[np.intp], planted: Flags, options: LiftOptions) -> Floats:
+    """Markers of limbs of constant length, over the whole sequence at once.
+
+    Markers that no drawing shows would be guesses with limbs of their own: they go along with those they hang on.
+    """
     seen = ~alignment.estimated[:, known]
-    seen[seen.sum(axis=1) < 4] = True
-    drawn = np.where(seen[..., None], alignment.markers[:, known], np.nan)
-    clip, held = alignment.clip[:, known], fixed_places(options.held, alignment.positions[:, known], names)
-    return reconstruct_markers(
+    seen[seen.sum(axis=1) < FEWEST_MARKS] = True
+    shown = np.flatnonzero(seen.any(axis=0))
+    part = known[shown]
+    names = tuple(alignment.names[index] for index in part)
+    bones = bones_between(names)
+    drawn = np.where(seen[:, shown, None], alignment.markers[:, part], np.nan)
+    clip, standing = alignment.clip[:, part], planted[:, shown]
+    held = fixed_places(options.held, alignment.positions[:, part], names)
+    markers = alignment.positions[:, known].copy()
+    found = reconstruct_markers(
         drawn,
         clip,
         alignment,
         bones,
         limb_lengths(drawn, clip, alignment, names, bones, options.lengths),
         refine=True,
-        planted=planted if planted.any() else None,
+        planted=standing if standing.any() else None,
         held=held if np.isfinite(held).any() else None,
-        flips=flips,
+        flips=flip_rows(options.flips, names, bones),
         stretch=options.stretch,
         root=names.index("pelvis") if "pelvis" in names else bones[0][0],
     )
+    moved = np.full(markers.shape, np.nan)
+    moved[:, shown] = found - markers[:, shown]
+    return markers + _with_neighbours(moved, bones_between(tuple(alignment.names[index] for index in known)))
+
+
+def _with_neighbours(moves: Floats, bones: Sequence[tuple[int, int]]) -> Floats:
+    """``moves`` (F, N, 3) of markers; those that are NaN take the mean of the markers that bones join them to."""
+    filled = moves.copy()
+    for _ in bones:
+        lost = np.flatnonzero(np.isnan(filled).any(axis=(0, 2)))
+        before = filled.copy()
+        for marker in lost:
+            others = [b if a == marker else a for a, b in bones if marker in (a, b)]
+            others = [other for other in others if not np.isnan(before[:, other]).any()]
+            if others:
+                filled[:, marker] = before[:, others].mean(axis=1)
+    return np.nan_to_num(filled)
 
 
 def _posed(

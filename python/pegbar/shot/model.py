@@ -236,7 +236,9 @@ class SecondarySection(Section):
     seed: int = Field(default=0, ge=0)
     samples: int = Field(default=2, ge=1, le=8)
     shadow: bool = True
-    separate: bool = False
+    passes: bool = True
+    separate: bool = True
+    clearance: float = Field(default=0.03, ge=0, le=1)
     misfit: float = Field(default=0.25, gt=0, allow_inf_nan=False)
     characters: list[str] = []
     frames: str = "secondary/final/final.####.png"

@@ -29,7 +29,7 @@ class ClothEngine:
     balls, and one cloth does not meet another or itself. The result has the same bits in every run.
     """
 
-    substeps: int = 40
+    substeps: int = 60
     rounds: int = 2
     name: str = "cloth"
 

@@ -22,7 +22,9 @@ FASTEST = 200.0
 class Engine(Protocol):
     """Simulates the elements that it supports."""
 
-    name: str
+    @property
+    def name(self) -> str:
+        """What the engine is called."""
 
     def supports(self, element: Element) -> bool:
         """Whether the engine can simulate ``element``."""

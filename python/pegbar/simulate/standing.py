@@ -36,8 +36,8 @@ class FloorBalls:
     ``friction`` are their material's.
     """
 
-    count: int = 24
-    size: float = 0.1
+    count: int = 16
+    size: float = 0.09
     spread: float = 0.3
     margin: float = 0.25
     density: float = 40.0

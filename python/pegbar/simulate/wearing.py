@@ -12,13 +12,16 @@ from pegbar.simulate.elements import Cloth, Pin
 from pegbar.simulate.figure import body_height, limb_between, marker, reaches
 from pegbar.simulate.materials import ClothMaterial, Color, Look, check
 from pegbar.simulate.scene import Character
-from pegbar.simulate.tracks import limb_frames
+from pegbar.simulate.tracks import filled, limb_frames
 
 Floats = NDArray[np.float64]
 #: Metres that the start of a cloth keeps clear of volumes, beside its thickness.
 CLEAR = 0.004
-#: How far round the wrist a scarf is held, in radians.
-GATHERED = 2.0
+#: How far round the wrist a scarf is held, in radians: like a knot, else it would have to fall to both sides of an arm
+#: that turns under it.
+GATHERED = 1.2
+#: Where the wrist is on the way from elbow to hand.
+WRIST = 0.85
 
 
 @dataclass(frozen=True)
@@ -54,10 +57,10 @@ class Scarves(Fabric):
     ``fineness`` is the number of threads across.
     """
 
-    length: float = 0.55
+    length: float = 0.5
     width: float = 0.075
     hands: str = "both"
-    fineness: int = 8
+    fineness: int = 6
 
     def build(self, name: str, character: Character, ground: float | None, seed: int) -> tuple[Cloth, ...]:
         """Make the scarves as the first frame's pose wears them."""
@@ -76,17 +79,17 @@ class Scarves(Fabric):
         columns = self.fineness
         rows = max(2, 1 + round(length / (width / (columns - 1))))
         wrist, along, radius = _wrist(character, limb, side)
-        flat = np.stack(np.meshgrid(np.linspace(0, length, rows), np.linspace(0, width, columns), indexing="ij"), -1)
-        rest = np.concatenate([flat, np.zeros((rows, columns, 1))], axis=2).reshape(-1, 3)
         round_it = radius + self.thickness + CLEAR
-        # Gathered on the lower side of the wrist, so that the hand has room to bend away from it.
         turn = np.linspace(-0.5, 0.5, columns) * min(width / round_it, GATHERED)
+        fall, share = np.meshgrid(np.linspace(0, length, rows), np.linspace(-0.5, 0.5, columns), indexing="ij")
+        across = share * width
+        rest = np.stack([fall, across, 0 * fall], axis=-1).reshape(-1, 3)
+        coordinates = np.stack([across, fall], axis=-1).reshape(-1, 2)
         down = _perpendicular(np.array([0.0, -1.0, 0.0]), along)
         over = np.cross(along, down)
         ring = wrist + round_it * (np.cos(turn)[:, None] * down + np.sin(turn)[:, None] * over)
-        drop = np.linspace(0, length, rows)[:, None, None] * np.array([0.0, -1.0, 0.0])
+        drop = fall[:, :1, None] * np.array([0.0, -1.0, 0.0])
         pin = Pin("limb", character.limb_names[limb], np.arange(columns), character.name)
-        coordinates = flat[..., ::-1].reshape(-1, 2)
         start = (ring[None] + drop).reshape(-1, 3)
         sheet = grid_triangles(rows, columns)
         made = (self.material(), self.look())
@@ -189,19 +192,15 @@ def _perpendicular(vector: Floats, axis: Floats) -> Floats:
 
 
 def _wrist(character: Character, limb: int, side: str) -> tuple[Floats, Floats, float]:
-    """The wrist's place, the direction of the forearm and its radius there, in the first frame."""
-    hand, elbow = marker(character, f"{side}_hand")[0], marker(character, f"{side}_elbow")[0]
-    volumes = character.volumes
-    known = int(np.flatnonzero(~np.isnan(volumes.start_radius[:, limb]))[0])
-    radii = (float(volumes.start_radius[known, limb]), float(volumes.end_radius[known, limb]))
-    ends = [volumes.start[known, limb], volumes.end[known, limb]]
-    hand_first = np.linalg.norm(ends[0] - marker(character, f"{side}_hand")[known]) < np.linalg.norm(
-        ends[1] - marker(character, f"{side}_hand")[known]
-    )
-    radius = 0.15 * radii[1 if hand_first else 0] + 0.85 * radii[0 if hand_first else 1]
-    axis = hand - elbow
+    """The wrist's place on the forearm's axis, the direction to the hand and the radius there, in the first frame."""
+    volumes, hand = character.volumes, marker(character, f"{side}_hand")[0]
+    ends = [filled(axis[:, limb])[0] for axis in (volumes.start, volumes.end)]
+    radii = [float(filled(radius[:, limb])[0]) for radius in (volumes.start_radius, volumes.end_radius)]
+    if np.linalg.norm(ends[0] - hand) < np.linalg.norm(ends[1] - hand):
+        ends, radii = ends[::-1], radii[::-1]
+    axis = ends[1] - ends[0]
     length = max(float(np.linalg.norm(axis)), 1e-6)
-    return elbow + 0.85 * axis, axis / length, radius
+    return ends[0] + WRIST * axis, axis / length, (1 - WRIST) * radii[0] + WRIST * radii[1]
 
 
 def _waist(character: Character, limb: int, rise: float) -> tuple[Floats, Floats]:

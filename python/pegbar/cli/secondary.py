@@ -1,0 +1,80 @@
+"""`pegbar secondary`: cloth and balls around a drawn character, from drawings to finished frames."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+
+from pegbar.cli.batch import BatchOptions, progress, run_stage
+from pegbar.errors import SimulationError
+from pegbar.shot.secondary_stage import SecondaryStage
+
+
+def secondary(shot: Path, options: BatchOptions | None = None) -> int:
+    """Add simulated secondary motion to a shot; see `pegbar secondary --help`.
+
+    Parameters
+    ----------
+    shot
+        The shot file.
+    """
+    options = options or BatchOptions()
+    with _bars() as tell:
+        stage = SecondaryStage(shot, options.overwrite, tell)
+        drivings = stage.drive()
+        for note in dict.fromkeys(stage.notes):
+            print(f"pegbar: warning: {note}", file=sys.stderr)
+        print(f"volumes: {_made(stage, 'volumes')}, in {os.path.relpath(stage.secondary.folder)}")
+        try:
+            scene = stage.simulate(drivings)
+        except SimulationError as error:
+            print(f"pegbar: {error}; what was made before is kept", file=sys.stderr)
+            return 1
+    print(f"simulation: {scene.frames} frames {_made(stage, 'simulation')}")
+    frames = stage.frames(drivings, scene)
+    start = time.perf_counter()
+    if code := run_stage("composite", frames, options):
+        return code
+    stage.times["render and composite"] = time.perf_counter() - start
+    finals = [frames.outputs(frame)[0] for frame in options.select(frames.shot.frames)]
+    report = stage.finish(scene, drivings, finals)
+    _summarise(stage, report)
+    return 0
+
+
+def _made(stage: SecondaryStage, name: str) -> str:
+    return "made" if stage.made.get(name) else "up to date"
+
+
+def _summarise(stage: SecondaryStage, report: dict[str, Any]) -> None:
+    parts = [f"drawn marks and volumes {report['reprojection_px']:.1g} px apart"]
+    if report.get("deepest_penetration_m") is not None:
+        parts.append(f"deepest penetration {1000 * report['deepest_penetration_m']:.1f} mm")
+    if report.get("stretch_p99") is not None:
+        parts.append(f"cloth stretched by {report['stretch_p99']:.1%} (99 in 100 threads by less)")
+    print(f"secondary: {', '.join(parts)}")
+    seconds = ", ".join(f"{name} {value:.1f}" for name, value in report["seconds"].items())
+    print(f"secondary: seconds: {seconds}")
+    print(f"secondary: animation, sheet.png and report.json in {os.path.relpath(stage.secondary.folder)}")
+
+
+@contextmanager
+def _bars() -> Iterator[Callable[[str, int, int], None]]:
+    """Give a function that shows a stage's progress: a bar a stage, one after the other."""
+    with ExitStack() as stack:
+        shown: dict[str, tuple[ExitStack, Callable[[], None]]] = {}
+
+        def tell(name: str, done: int, total: int) -> None:
+            if name not in shown:
+                for other, _ in shown.values():
+                    other.close()
+                inner = stack.enter_context(ExitStack())
+                shown[name] = (inner, inner.enter_context(progress(name, total)))
+            shown[name][1]()
+
+        yield tell

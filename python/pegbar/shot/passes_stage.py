@@ -1,0 +1,150 @@
+"""The frame stage of simulated elements: rendered from the cache, put among the drawn characters, and written."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pegbar.io.exr import write_exr
+from pegbar.io.sequence import FrameSequence
+from pegbar.io.simulation_cache import DiskCache
+from pegbar.layer.composite import Space, depth_composite
+from pegbar.layer.rim import rim_depth
+from pegbar.shot.drawn import Drawn, drawn_inputs, read_drawn
+from pegbar.shot.model import SecondarySection
+from pegbar.shot.plan import Shot
+from pegbar.shot.stages import Stage, check_passes, write_final
+from pegbar.shot.view import LIGHT, View, lay_under, part_of, seen_window
+from pegbar.simulate.layers import render_shadow
+from pegbar.simulate.meshes import Models, volume_meshes
+from pegbar.simulate.passes import Ink, Passes, render_passes
+from pegbar.simulate.scene import SimulationScene
+
+VERSION = 1
+Floats = NDArray[np.float32]
+# Toon shading from the side turned away from the light to the lit one, and lines as wide as in a drawing of 960 pixels.
+BANDS = (0.42, 0.75, 1.0)
+INK = Ink(1.8, (0.03, 0.012, 0.028, 1.0), None)
+
+
+@dataclass(frozen=True, eq=False)
+class Layers:
+    """Where a frame's elements come from and go to.
+
+    ``first`` is the film frame of the scene's first, ``drawn`` the files of the characters in 3D; ``others`` are the
+    shots of further characters and ``scales`` what brings their depths to those of the shot's own camera.
+    """
+
+    scene: SimulationScene
+    section: SecondarySection
+    cache: DiskCache
+    first: int
+    finals: FrameSequence
+    passes: FrameSequence
+    characters: tuple[Path, ...]
+    others: tuple[Shot, ...] = ()
+    scales: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class ElementsStage(Stage):
+    """Renders the elements of a frame and composites them with the drawings in depth order (2010, section 3.3)."""
+
+    layers: Layers = field(kw_only=True)
+
+    @cached_property
+    def models(self) -> Models:
+        """The elements' meshes, made ready once in every worker."""
+        return Models(self.layers.scene)
+
+    def outputs(self, frame: int) -> list[Path]:
+        layers = self.layers
+        exr = [layers.passes.path(frame)] if layers.section.passes else []
+        return [layers.finals.path(frame), *exr]
+
+    def inputs(self, frame: int) -> list[Path]:
+        layers, name = self.layers, f"{frame - self.layers.first:04d}.npz"
+        found = [layers.cache.folder / element.name / name for element in layers.scene.elements]
+        for shot in (self.shot, *layers.others):
+            found += drawn_inputs(shot, frame)
+        return [*found, *layers.characters]
+
+    def make(self, frame: int) -> tuple[str, ...]:
+        view = self.render(frame)
+        final, *exr = self.outputs(frame)
+        picture, notes = self._composite(frame, view.whole())
+        write_final(final, picture)
+        if exr:
+            write_exr(exr[0], view.channels(), window=view.window)
+        return notes
+
+    def render(self, frame: int) -> View:
+        """Return what is seen of the elements in ``frame`` and of their and the characters' shadows."""
+        layers = self.layers
+        index, samples, ground = frame - layers.first, layers.section.samples, layers.scene.ground
+        camera, meshes = layers.scene.cameras[index], self.models.meshes(layers.cache, index)
+        pen = INK.width * camera.image_size[0] / 960
+        casting = [*meshes, *volume_meshes(layers.scene, index)] if layers.section.shadow and ground is not None else []
+        window = seen_window(camera, meshes, casting, ground or 0.0, pen)
+        part = part_of(camera, window)
+        passes = render_passes(
+            meshes, part, samples=samples, light=LIGHT, bands=BANDS, ink=Ink(pen, INK.color, INK.crease_angle)
+        )
+        shadow = None
+        if casting and ground is not None:
+            shadow = render_shadow(casting, part, ground, samples=samples, light=LIGHT)
+            lay_under(passes, shadow)
+        return View(camera.image_size, window, passes, shadow)
+
+    def _composite(self, frame: int, passes: Passes) -> tuple[NDArray[Any], tuple[str, ...]]:
+        """Put one character after the other into what is rendered, the shot's own first."""
+        output = self.shot.settings.output
+        notes: list[str] = []
+        beauty: NDArray[Any] = passes.beauty
+        space: Space = "linear"
+        depth = rim_depth(passes.beauty, passes.depth)
+        shots = (self.shot, *self.layers.others)
+        for place, (shot, scale) in enumerate(zip(shots, (1.0, *self.layers.scales), strict=True), 1):
+            drawn = read_drawn(shot, frame)
+            notes += drawn.notes
+            check_passes(frame, self.layers.passes.path(frame), drawn, beauty, depth)
+            drawn_depth = drawn.depth * np.float32(scale)
+            is_last = place == len(shots)
+            beauty = depth_composite(
+                drawn.color,
+                drawn.alpha,
+                drawn_depth,
+                beauty,
+                depth,
+                rendered_space=space,
+                space=output.composite_space,
+                dtype=np.uint8 if is_last and not output.is_exr else np.float32,
+            )
+            if not is_last:
+                depth, space = _nearest(depth, drawn, drawn_depth), output.composite_space
+        return beauty, tuple(notes)
+
+    def _recipe(self, frame: int) -> str:
+        layers, shot = self.layers, self.shot
+        section = layers.section
+        parts: list[Any] = [VERSION, [entry.model_dump() for entry in section.elements], section.seed, section.samples]
+        parts += [section.shadow, layers.scene.ground, layers.first, layers.scales, shot.settings.output.model_dump()]
+        for drawn in (shot, *layers.others):
+            parts += [drawn.settings.drawing.model_dump(), drawn.matte]
+            parts += [drawn.palette.colors.tolist(), drawn.palette.labels.tolist()]
+        return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+
+
+def _nearest(rendered: Floats, drawn: Drawn, drawn_depth: Floats) -> Floats:
+    """The nearer depth of each of the drawing's pixels; a pixel drawn without depth keeps what is behind it."""
+    height, width = drawn.alpha.shape
+    blocks = rendered.reshape(height, rendered.shape[0] // height, width, rendered.shape[1] // width)
+    nearest: Floats = np.minimum(blocks.min(axis=(1, 3)), np.where(drawn.alpha > 0, drawn_depth, np.inf))
+    return nearest
