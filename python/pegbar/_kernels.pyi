@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
-    "Deformer",
     "SOURCES",
+    "Deformer",
     "average_triangles",
     "capsule_distances",
     "composite_matte",

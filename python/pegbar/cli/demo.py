@@ -1,4 +1,4 @@
-"""`pegbar demo`: the sample shot, from nothing to finished frames."""
+"""`pegbar demo`: the sample shot, and all that pegbar makes of it, from nothing to a page to look at."""
 
 from __future__ import annotations
 
@@ -12,10 +12,15 @@ from cyclopts import Parameter
 from numpy.typing import NDArray
 
 from pegbar.cli.batch import BatchOptions, progress, run_stage
+from pegbar.cli.lift import lift
+from pegbar.cli.secondary import secondary
+from pegbar.io import atomic
 from pegbar.io.animation import write_animation
 from pegbar.io.frames import read_picture, write_image
 from pegbar.report.contact_sheet import contact_sheet, over_paper
+from pegbar.report.page import Picture, Section, html_page
 from pegbar.sample.shot import write_sample
+from pegbar.shot.animating import Casting, Part, animate_parts
 from pegbar.shot.plan import Shot, open_shot
 from pegbar.shot.stages import CompositeStage, DepthStage
 
@@ -28,7 +33,7 @@ def demo(
     length: Annotated[int, Parameter(help="Number of frames that the dance is spread over.")] = 48,
     jobs: Annotated[int | None, Parameter(help="Worker processes (default: one a core).")] = None,
 ) -> int:
-    """Make the sample shot and finish it; see `pegbar demo --help`.
+    """Make the sample shot and all that can be made of it; see `pegbar demo --help`.
 
     Parameters
     ----------
@@ -38,25 +43,40 @@ def demo(
     start = time.perf_counter()
     with progress("sample", length) as advance:
         path = write_sample(folder, frames=length, workers=jobs, progress=lambda *_: advance())
-    shot, options = open_shot(path), BatchOptions(jobs=jobs)
-    for name, stage in (("depth", DepthStage(shot)), ("composite", CompositeStage(shot))):
-        if code := run_stage(name, stage, options):
-            return code
-    sheet, animation = folder / "contact_sheet.png", folder / "animation.png"
-    chosen = options.select(shot.frames)
-    finals = [picture for frame in spread(chosen, SHEET) for picture in _rows(shot, frame)]
-    write_image(sheet, contact_sheet(finals, columns=6))
-    write_animation(animation, _finals(shot, chosen), shot.settings.shot.frame_rate)
-    print(f"\nMade in {time.perf_counter() - start:.1f} s:")
-    for made, what in (
-        (animation, "the animation: open it in a browser"),
-        (sheet, "drawing, depth and finished frame side by side"),
-        (folder / "final", "the finished frames"),
-        (path, "the shot file: check, depth and composite take it"),
-        (folder / "clip.bvh", "the dance as a motion-capture clip; truth.npz holds its markers and cameras"),
-    ):
-        print(f"  {made}  {what}")
+    options = BatchOptions(jobs=jobs)
+    # The dance is two seconds long: spread over fewer frames it is too fast for cloth to follow.
+    jobs_done = [_composite(path, options)]
+    if length >= SHEET:
+        jobs_done += [secondary(path, options), lift(path)]
+    if code := max(jobs_done):
+        return code
+    animated = folder / "animated.gif"
+    first = Part(folder / "drawings/dancer.0001.png", (folder / "clip.bvh",))
+    animate_parts(
+        [first], animated, casting=Casting(joints=folder / "annotation.json", keep=folder / ".pegbar/puppets")
+    )
+    page = folder / "index.html"
+    atomic.write_bytes(page, html_page("pegbar: the sample shot", _LEAD, _sections(folder)).encode())
+    print(f"\nMade in {time.perf_counter() - start:.1f} s. Open {page} in a browser, or:")
+    for name, what in _MADE.items():
+        if (folder / name).exists():
+            print(f"  {folder / name}  {what}")
     return 0
+
+
+_LEAD = (
+    "A dancer, drawn frame by frame with her joints marked, and a clip of the dance. This page shows what pegbar makes "
+    "of the two; every command that made it works on your own shot."
+)
+_MADE = {
+    "secondary/animation.png": "scarves, a skirt and balls that collide with the drawn dancer",
+    "lift/animation.glb": "the drawings as a 3D animation, for any 3D package",
+    "animated.gif": "one drawing that performs the clip",
+    "animation.png": "rendered elements in front of and behind the drawing",
+    "final": "the finished frames",
+    "shot.toml": "the shot file: check, align, lift, secondary, depth, composite and report take it",
+    "clip.bvh": "the dance as a motion-capture clip; truth.npz holds its markers and cameras",
+}
 
 
 def spread(frames: list[int], count: int) -> list[int]:
@@ -67,6 +87,68 @@ def spread(frames: list[int], count: int) -> list[int]:
 def final_path(shot: Shot, frame: int) -> Path:
     """Return where the finished ``frame`` is."""
     return CompositeStage(shot).outputs(frame)[0]
+
+
+def _composite(path: Path, options: BatchOptions) -> int:
+    """Depth of the drawings, and the composite with the rendered hoop and ribbon."""
+    shot = open_shot(path)
+    for name, stage in (("depth", DepthStage(shot)), ("composite", CompositeStage(shot))):
+        if code := run_stage(name, stage, options):
+            return code
+    chosen = options.select(shot.frames)
+    finals = [picture for frame in spread(chosen, SHEET) for picture in _rows(shot, frame)]
+    write_image(shot.folder / "contact_sheet.png", contact_sheet(finals, columns=6))
+    write_animation(shot.folder / "animation.png", _finals(shot, chosen), shot.settings.shot.frame_rate)
+    return 0
+
+
+def _sections(folder: Path) -> list[Section]:
+    """The three jobs, and what they begin with; those that have run."""
+    found = [
+        Section(
+            "What the artist gives",
+            ("Drawings with marked joints and limb colours, and a motion-capture clip.",),
+            files=(("annotation.json", "joint marks"), ("clip.bvh", "the clip"), ("shot.toml", "the shot file")),
+            pictures=(Picture("drawings/dancer.0001.png", "a drawing"), Picture("labels/labels.0001.png", "its limbs")),
+        ),
+        Section(
+            "1. Secondary motion",
+            ("pegbar secondary: cloth and balls collide with the drawn limbs, in right depth order.",),
+            files=(("secondary/report.json", "penetration, stretch, seconds"),),
+            pictures=(
+                Picture("secondary/animation.png", "scarves, skirt and balls, simulated by pegbar"),
+                Picture("secondary/volumes.png", "limb boxes and collision volumes"),
+                Picture("animation.png", "pegbar composite: hoop and ribbon rendered elsewhere"),
+                Picture("contact_sheet.png", "drawing, depth, composite"),
+            ),
+        ),
+        Section(
+            "2. Lifted to 3D",
+            ("pegbar lift: the artist's poses and timing on a 3D skeleton.",),
+            files=(
+                ("lift/animation.glb", "glTF, opens in viewers, Blender and engines"),
+                ("lift/animation.bvh", "BVH"),
+                ("lift/report.json", "figures"),
+            ),
+            pictures=(
+                Picture("lift/preview.gif", "drawing, overlay and turntable"),
+                Picture("align/sheet.png", "clip and drawing, aligned"),
+            ),
+        ),
+        Section(
+            "3. One picture, animated",
+            ("pegbar animate: a single drawing performs the clip.",),
+            pictures=(Picture("animated.gif", "made of the first drawing alone"),),
+        ),
+    ]
+    return [part for section in found if (part := _there(section, folder)).pictures]
+
+
+def _there(section: Section, folder: Path) -> Section:
+    """The section without what was not made."""
+    pictures = tuple(picture for picture in section.pictures if (folder / picture.source).is_file())
+    files = tuple(entry for entry in section.files if (folder / entry[0]).is_file())
+    return Section(section.title, section.words, files=files, pictures=pictures)
 
 
 def _rows(shot: Shot, frame: int) -> Iterator[NDArray[np.uint8]]:

@@ -15,7 +15,7 @@ from pegbar.errors import MissingExtraError, describe
 
 app = App(
     name="pegbar",
-    help="Hand-drawn animation and motion capture: depth for drawings, and depth compositing with 3D renders.",
+    help="Hand-drawn animation and motion capture: 3D secondary motion, lifting to 3D, pictures that perform clips.",
     version=lambda: version("pegbar"),
     help_format="plaintext",
     suppress_keyboard_interrupt=False,
@@ -96,9 +96,10 @@ It opens offline, in any browser.
 
 Example: pegbar report my_shot/shot.toml""",
     "motion": """Look at motion capture clips.""",
-    "demo": """Make a sample shot from nothing and run every stage on it.
+    "demo": """Make a sample shot from nothing and run all three jobs on it.
 
-A drawn dancer with a hoop and a ribbon.
+A drawn dancer gets scarves, a skirt and balls, becomes a 3D animation, and one drawing of her performs the clip.
+index.html shows all of it, offline.
 
 Example: pegbar demo demo""",
     "reproduce": """Repeat an experiment of the papers on clips that you have.

@@ -54,6 +54,9 @@ path = "clip.bvh"
 beauty = "passes/passes.####.exr"
 depth = "passes/passes.####.exr"
 
+[secondary]
+elements = ["scarves", "skirt", "balls"]
+
 [output]
 frames = "final/final.####.png"
 depth = "depth/depth.####.exr"
