@@ -221,7 +221,7 @@ mod tests {
 
     /// The indices of packed data, by the decoder that the format describes.
     fn expand(data: &[u8]) -> Vec<u8> {
-        let (mut bytes, mut at) = (Vec::new(), 0);
+        let (mut bytes, mut at) = (Vec::<u8>::new(), 0);
         while data[at] > 0 {
             bytes.extend(&data[at + 1..=at + data[at] as usize]);
             at += data[at] as usize + 1;
