@@ -55,15 +55,17 @@ pub fn step_cloth(
     py.detach(|| cloth::step_cloth(&sheet, &forces, &drive, positions, velocities)).map_err(to_python)
 }
 
+/// Metres by point, and the nearest capsule's row.
+type Distances<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<u32>>);
+
 #[pyfunction]
 pub fn capsule_distances<'py>(
     py: Python<'py>,
     points: PyReadonlyArray2<'py, f64>,
     capsules: PyReadonlyArray2<'py, f64>,
-) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<u32>>)> {
+) -> PyResult<Distances<'py>> {
     let count = [points.shape()[0]];
-    let (distance, nearest): (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<u32>>) =
-        (empty(py, count)?, empty(py, count)?);
+    let (distance, nearest): Distances<'py> = (empty(py, count)?, empty(py, count)?);
     let (mut metres, mut rows) = (distance.readwrite(), nearest.readwrite());
     let (points, capsules) = (grouped("points", &points)?, grouped("capsules", &capsules)?);
     let (metres_out, rows_out) = (metres.as_slice_mut()?, rows.as_slice_mut()?);
