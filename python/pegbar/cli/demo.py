@@ -117,9 +117,9 @@ def _sections(folder: Path) -> list[Section]:
             files=(("secondary/report.json", "penetration, stretch, seconds"),),
             pictures=(
                 Picture("secondary/animation.png", "scarves, skirt and balls, simulated by pegbar"),
-                Picture("secondary/volumes.png", "limb boxes and collision volumes"),
+                Picture("secondary/volumes.png", "limb boxes and collision volumes", wide=True),
                 Picture("animation.png", "pegbar composite: hoop and ribbon rendered elsewhere"),
-                Picture("contact_sheet.png", "drawing, depth, composite"),
+                Picture("contact_sheet.png", "drawing, depth, composite", wide=True),
             ),
         ),
         Section(
@@ -131,8 +131,8 @@ def _sections(folder: Path) -> list[Section]:
                 ("lift/report.json", "figures"),
             ),
             pictures=(
-                Picture("lift/preview.gif", "drawing, overlay and turntable"),
-                Picture("align/sheet.png", "clip and drawing, aligned"),
+                Picture("lift/preview.gif", "drawing, overlay and turntable", wide=True),
+                Picture("align/sheet.png", "clip and drawing, aligned", wide=True),
             ),
         ),
         Section(

@@ -24,7 +24,8 @@ h1 { margin-bottom: .2rem; } h2 { border-top: 1px solid var(--line); margin-top:
 table { border-collapse: collapse; margin: 1rem 0; }
 td { border-bottom: 1px solid var(--line); padding: .25rem 1rem .25rem 0; }
 td + td { font-variant-numeric: tabular-nums; }
-figure { display: inline-block; margin: .5rem 1rem .5rem 0; max-width: 100%; vertical-align: top; }
+.pictures { display: grid; gap: 1rem; grid-template-columns: repeat(auto-fit, minmax(min(100%, 440px), 1fr)); }
+figure { margin: 0; } .wide { grid-column: 1 / -1; }
 img, video { background: #fff; border: 1px solid var(--line); max-width: 100%; }
 figcaption { font-size: .85rem; opacity: .8; } .warning { color: var(--warn); }
 """.strip()
@@ -32,10 +33,14 @@ figcaption { font-size: .85rem; opacity: .8; } .warning { color: var(--warn); }
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture, an animation or a video: ``source`` is a path relative to the page, or a data address."""
+    """A picture, an animation or a video: ``source`` is a path relative to the page, or a data address.
+
+    A ``wide`` one has a row for itself, others stand side by side.
+    """
 
     source: str
     caption: str
+    wide: bool = False
 
     @property
     def is_video(self) -> bool:
@@ -81,7 +86,8 @@ def _section(section: Section) -> str:
     if section.files:
         rows = (f'<li><a href="{escape(path)}">{escape(path)}</a> {escape(what)}</li>' for path, what in section.files)
         parts.append(f"<ul>\n{chr(10).join(rows)}\n</ul>")
-    parts += [_picture(picture) for picture in section.pictures]
+    if section.pictures:
+        parts += ['<div class="pictures">', *(_picture(picture) for picture in section.pictures), "</div>"]
     return "\n".join([*parts, "</section>"])
 
 
@@ -91,4 +97,5 @@ def _picture(picture: Picture) -> str:
         shown = f'<video src="{escape(picture.source)}" controls loop muted></video>'
     else:
         shown = f'<img src="{escape(picture.source)}" alt="{caption}">'
-    return f"<figure>{shown}<figcaption>{caption}</figcaption></figure>"
+    kind = ' class="wide"' if picture.wide else ""
+    return f"<figure{kind}>{shown}<figcaption>{caption}</figcaption></figure>"

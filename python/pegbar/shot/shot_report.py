@@ -76,7 +76,7 @@ def _aligned(stage: AlignStage) -> list[Section]:
             words=alignment.notes,
             warnings=(*stale, *alignment.warnings),
             table=tuple(_alignment_rows(alignment, float(np.median(heights)))),
-            pictures=(*pictures, Picture(_embedded(plot), "how far the clip is from the marks")),
+            pictures=(*pictures, Picture(_embedded(plot), "how far the clip is from the marks", wide=True)),
         )
     ]
 
@@ -134,14 +134,14 @@ def _finished(shot: Shot) -> list[Section]:
         chosen = [there[index * len(there) // min(len(there), _FRAMES)] for index in range(min(len(there), _FRAMES))]
         sheet = contact_sheet([read_picture(path) for path in chosen], columns=4, width=380)
         made = ("frames there", f"{len(there)} of {len(shot.frames)}")
-        sections.append(Section(title, table=(made,), pictures=(Picture(_embedded(sheet), title.lower()),)))
+        sections.append(Section(title, table=(made,), pictures=(Picture(_embedded(sheet), title.lower(), wide=True),)))
     return sections
 
 
 def _picture(path: Path, caption: str) -> Picture:
     """The file's picture, sheets no wider than a screen."""
     if path.stem in ("sheet", "warp"):
-        return Picture(_embedded(read_picture(path)), caption)
+        return Picture(_embedded(read_picture(path)), caption, wide=True)
     return Picture(data_address(path.read_bytes(), path.suffix), caption)
 
 
