@@ -280,25 +280,27 @@ mod tests {
     }
 
     #[test]
-    fn only_what_changed_is_kept() {
+    fn only_what_changed_is_kept() -> Result<(), KernelError> {
         let table: Vec<u8> = (0..TABLE).map(|entry| (entry >> 10) as u8).collect();
-        let mut frames = vec![[0, 0, 0, 255]; 2 * 12];
+        let mut frames = [[0, 0, 0, 255]; 2 * 12];
         frames[12 + 5] = [255, 0, 0, 255];
         frames[12 + 7] = [255, 0, 0, 255];
         let mut previous = vec![0; 12];
-        let packed = pack_frames(frames.as_flattened(), 4, 4, 3, &table, Some(&mut previous)).unwrap();
+        let packed = pack_frames(frames.as_flattened(), 4, 4, 3, &table, Some(&mut previous))?;
         assert_eq!(packed[0].place, [0, 0, 1, 1]);
         assert_eq!(packed[1].place, [1, 1, 3, 1]);
         assert_eq!(expand(&packed[1].data), [31, CLEAR, 31]);
         assert_eq!(previous, [0, 0, 0, 0, 0, 31, 0, 31, 0, 0, 0, 0]);
+        Ok(())
     }
 
     #[test]
-    fn low_alpha_is_left_out() {
+    fn low_alpha_is_left_out() -> Result<(), KernelError> {
         let table = vec![7; TABLE];
-        let mut frame = vec![[9, 9, 9, 127]; 6];
+        let mut frame = [[9, 9, 9, 127]; 6];
         frame[4][3] = 128;
-        let packed = pack_frames(frame.as_flattened(), 4, 3, 2, &table, None).unwrap();
+        let packed = pack_frames(frame.as_flattened(), 4, 3, 2, &table, None)?;
         assert_eq!((packed[0].place, expand(&packed[0].data)), ([1, 1, 1, 1], vec![7]));
+        Ok(())
     }
 }

@@ -60,13 +60,14 @@ mod tests {
     }
 
     #[test]
-    fn a_ground_is_one_colour_or_a_picture() {
+    fn a_ground_is_one_colour_or_a_picture() -> Result<(), KernelError> {
         let drawn = [[10, 20, 30, 255], [1, 2, 3, 0]];
         let mut out = [[0; 3]; 2];
-        over_ground(&drawn, &[[9, 8, 7]], &mut out).unwrap();
+        over_ground(&drawn, &[[9, 8, 7]], &mut out)?;
         assert_eq!(out, [[10, 20, 30], [9, 8, 7]]);
-        over_ground(&drawn, &[[9, 8, 7], [4, 5, 6]], &mut out).unwrap();
+        over_ground(&drawn, &[[9, 8, 7], [4, 5, 6]], &mut out)?;
         assert_eq!(out, [[10, 20, 30], [4, 5, 6]]);
         assert!(over_ground(&drawn, &[[0; 3]; 3], &mut out).is_err());
+        Ok(())
     }
 }

@@ -117,8 +117,8 @@ def _sections(folder: Path) -> list[Section]:
             files=(("secondary/report.json", "penetration, stretch, seconds"),),
             pictures=(
                 Picture("secondary/animation.png", "scarves, skirt and balls, simulated by pegbar"),
-                Picture("secondary/volumes.png", "limb boxes and collision volumes", wide=True),
                 Picture("animation.png", "pegbar composite: hoop and ribbon rendered elsewhere"),
+                Picture("secondary/volumes.png", "limb boxes and collision volumes", wide=True),
                 Picture("contact_sheet.png", "drawing, depth, composite", wide=True),
             ),
         ),
