@@ -25,7 +25,8 @@ samples = 1
 def made(tmp_path_factory):
     """The sample shot, 6 small frames, with a scarf and balls."""
     shot = write_sample(tmp_path_factory.mktemp("secondary"), size=(240, 136), frames=6, samples=1)
-    shot.write_text(shot.read_text() + SECTION)
+    before, _, after = shot.read_text().partition("[secondary]")
+    shot.write_text(before + after[after.index("[output]") :] + SECTION)
     assert main(["secondary", str(shot), "--jobs", "1"]) == 0
     return shot
 
