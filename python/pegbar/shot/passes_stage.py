@@ -22,7 +22,7 @@ from pegbar.shot.model import SecondarySection
 from pegbar.shot.plan import Shot
 from pegbar.shot.stages import Stage, check_passes, write_final
 from pegbar.shot.view import LIGHT, View, lay_under, part_of, seen_window
-from pegbar.simulate.layers import render_shadow
+from pegbar.simulate.layers import render_shadow, shadow_meshes
 from pegbar.simulate.meshes import Models, volume_meshes
 from pegbar.simulate.passes import Ink, Passes, render_passes
 from pegbar.simulate.scene import SimulationScene
@@ -94,11 +94,14 @@ class ElementsStage(Stage):
         casting = [*meshes, *volume_meshes(layers.scene, index)] if layers.section.shadow and ground is not None else []
         window = seen_window(camera, meshes, casting, ground or 0.0, pen)
         part = part_of(camera, window)
+        # A shadow of its own is only for the file; without one it is rendered along with the elements.
+        apart = layers.section.passes
+        shown = meshes if apart or ground is None else [*meshes, *shadow_meshes(casting, ground, light=LIGHT)]
         passes = render_passes(
-            meshes, part, samples=samples, light=LIGHT, bands=BANDS, ink=Ink(pen, INK.color, INK.crease_angle)
+            shown, part, samples=samples, light=LIGHT, bands=BANDS, ink=Ink(pen, INK.color, INK.crease_angle)
         )
         shadow = None
-        if casting and ground is not None:
+        if apart and casting and ground is not None:
             shadow = render_shadow(casting, part, ground, samples=samples, light=LIGHT)
             lay_under(passes, shadow)
         return View(camera.image_size, window, passes, shadow)
