@@ -63,7 +63,7 @@ def test_numbered_files(tmp_path):
 @pytest.mark.parametrize(
     ("name", "alpha", "problem"),
     [
-        ("a.avi", False, "path: want a suffix"),
+        ("a.avi", False, "a.avi: want a suffix"),
         ("a.mp4", True, "has no transparency"),
         ("a.####.jpg", False, "for a sequence"),
         ("none/a.gif", False, "no such folder"),

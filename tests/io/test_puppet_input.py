@@ -88,6 +88,8 @@ def test_problems_name_the_file(tmp_path):
     (tmp_path / "annotation.json").unlink()
     with pytest.raises(FileNotFoundError, match="no joints are marked beside the picture"):
         read_puppet_input(picture)
+    with pytest.raises(FileNotFoundError, match="no such file"):
+        read_puppet_input(tmp_path / "missing.png")
     value = {"markers": ["head"], "image_size": [9, 9], "frames": [{"xy": [[4, 5]]}]}
     (tmp_path / "annotation.json").write_text(json.dumps(value))
     with pytest.raises(FormatError, match="names no picture: give the picture as well"):

@@ -13,6 +13,7 @@ from pegbar.sample.shot import write_sample
 from pegbar.shot import secondary_stage
 from pegbar.simulate.cloth import ClothEngine
 
+OWN = '\n[secondary]\nelements = ["scarves", "skirt", "balls"]\n'
 SECTION = """
 [secondary]
 elements = [{ preset = "scarves", hands = "left", fineness = 4 }, { preset = "balls", count = 4 }]
@@ -25,8 +26,9 @@ samples = 1
 def made(tmp_path_factory):
     """The sample shot, 6 small frames, with a scarf and balls."""
     shot = write_sample(tmp_path_factory.mktemp("secondary"), size=(240, 136), frames=6, samples=1)
-    before, _, after = shot.read_text().partition("[secondary]")
-    shot.write_text(before + after[after.index("[output]") :] + SECTION)
+    text = shot.read_text()
+    assert OWN in text
+    shot.write_text(text.replace(OWN, "") + SECTION)
     assert main(["secondary", str(shot), "--jobs", "1"]) == 0
     return shot
 
@@ -104,6 +106,7 @@ def test_an_explosion_names_the_frame_and_keeps_what_was_made(made, monkeypatch,
         ('"scarves", hands = "left"', '"scarfs"', "no preset 'scarfs': there are scarves"),
         ('"balls"', '"balls", character = "bob"', "no character 'bob': there is sample"),
         ('hands = "left"', "lenght = 2", "no setting 'lenght'"),
+        ("[secondary]", '[secondary]\nframes = "f.####.xyz"', "secondary.frames: want a name that ends in .png"),
         ("[secondary]", "[secondary]\nelement = 3", "secondary.element: no such key"),
         ('elements = [{ preset = "scarves"', 'misfit = 0\nelements = [{ preset = "scarves"', "secondary.misfit"),
     ],
@@ -115,6 +118,18 @@ def test_what_cannot_be_is_named(made, tmp_path, capsys, old, new, message):
         made.write_text(text.replace(old, new))
         assert main(["secondary", str(made)]) == 2
         assert message in capsys.readouterr().err
+    finally:
+        made.write_text(text)
+
+
+def test_a_wrong_preset_is_found_by_check_and_before_volumes(made, tmp_path, capsys):
+    text = made.read_text()
+    try:
+        made.write_text(text.replace('"scarves"', '"scarfs"').replace("[secondary]", '[secondary]\noutput = "none"'))
+        assert main(["check", str(made)]) == 1
+        assert "secondary.elements: no preset 'scarfs'" in capsys.readouterr().err
+        assert main(["secondary", str(made)]) == 2
+        assert not (made.parent / "none").exists()
     finally:
         made.write_text(text)
 

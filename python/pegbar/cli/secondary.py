@@ -26,6 +26,7 @@ def secondary(shot: Path, options: BatchOptions | None = None) -> int:
     options = options or BatchOptions()
     with _bars() as tell:
         stage = SecondaryStage(shot, options.overwrite, tell)
+        options.select(stage.secondary.stages[0].bare.frames)
         drivings = stage.drive()
         for note in dict.fromkeys(stage.notes):
             print(f"pegbar: warning: {note}", file=sys.stderr)

@@ -46,13 +46,13 @@ def check_film(path: _Path, *, alpha: bool = False) -> None:
     suffix = path.suffix.lower()
     if is_sequence(path):
         if suffix not in (".png", ".tif", ".tiff"):
-            raise ValueError(f"path: want .png or .tif for a sequence, got {suffix!r}")
+            raise ValueError(f"{path}: want .png or .tif for a sequence, got {suffix!r}")
         FrameSequence.parse(path)
     elif suffix in video.SUFFIXES:
         video.find_codec(path, alpha=alpha)
     elif suffix not in ANIMATIONS:
         raise ValueError(
-            f"path: want a suffix of {', '.join((*ANIMATIONS, *video.SUFFIXES))} or a sequence like walk.####.png, "
+            f"{path}: want a suffix of {', '.join((*ANIMATIONS, *video.SUFFIXES))} or a sequence like walk.####.png, "
             f"got {suffix!r}"
         )
 

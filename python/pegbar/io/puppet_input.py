@@ -68,6 +68,8 @@ def read_puppet_input(
     else:
         given = picture
         joints = Path(joints) if joints is not None else find_joints(picture)
+    if given is not None and not given.exists():
+        raise FileNotFoundError(2, "no such file or directory", str(given))
     if joints is None:
         names = f"{picture.stem}.json, {picture.stem}.yaml, {', '.join(BESIDE)}"
         raise FileNotFoundError(2, f"no joints are marked beside the picture (looked for {names})", str(picture))

@@ -242,8 +242,9 @@ def _as_drawn(
     sides = np.array([_side(source.drives.get(name, "")) for name in source.names])
     depths = distance - _HALF_WIDTH * sides * float(left @ away)
     pose = camera.unproject(source.marks, depths)
-    notes = ("no pose of the clip is like the figure: it starts as drawn, and its limbs turn as the clip's do",)
-    return SeenPose(camera, int(frames[choice]), pose, False, azimuth, found, 0.0, notes)
+    frame = int(frames[choice])
+    note = f"no pose of the clip is like the figure: it is as drawn in frame {frame}, and limbs turn from there"
+    return SeenPose(camera, frame, pose, False, azimuth, found, 0.0, (note,))
 
 
 def _side(marker: str) -> int:

@@ -132,7 +132,10 @@ class AlignStage:
         elif not self.numbers:
             problems.append("the shot's annotations have no marks for its drawings")
         if self.shot.settings.clip is None:
-            problems.append("the shot has no [clip]: name a path, or a folder of clips to look in (pegbar match helps)")
+            problems.append(
+                f"{self.shot.folder}: the shot has no [clip]: name a path, or a folder of clips to look in "
+                "(pegbar match helps)"
+            )
         if problems:
             raise ShotError(problems)
 

@@ -12,6 +12,7 @@ from pegbar.errors import describe
 from pegbar.shot.align_stage import AlignStage
 from pegbar.shot.clip_choice import check_part, read_clip
 from pegbar.shot.plan import Shot
+from pegbar.shot.secondary import secondary_problems
 
 #: What a frame takes on the disk, bytes a pixel: a depth map, its picture, a finished frame, a rendered pass.
 _DEPTH, _PICTURE, _FINISHED, _PASSES = 4, 1, 3, 12
@@ -19,8 +20,10 @@ _CLIPS = (".bvh", ".amc", ".c3d")
 
 
 def section_problems(shot: Shot) -> list[str]:
-    """Return what would stop or spoil `pegbar align`, `lift` and the frame stages, a line each."""
-    return [*_marks(shot), *_clip(shot), *_lift(shot), *_disk(shot)]
+    """Return what would stop or spoil `pegbar align`, `lift`, `secondary` and the frame stages, a line each."""
+    section = shot.settings.secondary
+    secondary = secondary_problems(section, shot.folder) if section is not None else []
+    return [*_marks(shot), *_clip(shot), *_lift(shot), *secondary, *_disk(shot)]
 
 
 def _marks(shot: Shot) -> list[str]:

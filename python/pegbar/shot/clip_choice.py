@@ -42,7 +42,7 @@ def choose_clip(
     Raises
     ------
     ValueError
-        Where no clip of the folder fits the drawing, naming the best one and its cost.
+        Where no clip of the folder can be compared with the drawing, saying why.
     FormatError, OSError
         For a clip that cannot be read.
     """

@@ -17,12 +17,13 @@ from pegbar.errors import ShotError
 from pegbar.scene.driving import Driving
 from pegbar.shot.characters import drawn_rows, film_cameras, film_character, seen_by
 from pegbar.shot.driving_stage import DrivingStage
+from pegbar.shot.find import plan_output
 from pegbar.shot.load import load_shot
 from pegbar.shot.model import ElementEntry, SecondarySection
 from pegbar.shot.plan import Shot
 from pegbar.simulate.elements import Element
 from pegbar.simulate.materials import Wind
-from pegbar.simulate.presets import preset_elements
+from pegbar.simulate.presets import check_preset, preset_elements
 from pegbar.simulate.scene import Character, PreRoll, SimulationScene
 
 VERSION = 1
@@ -44,6 +45,11 @@ class Secondary:
         if found is None:
             raise ShotError([f'{self.path}: the shot has no [secondary]: elements = ["skirt"] is enough'])
         return found
+
+    def check(self) -> None:
+        """Raise ShotError for what the section asks for and there is not, before any work."""
+        if problems := secondary_problems(self.section, self.path.absolute().parent):
+            raise ShotError([f"{self.path}: {problem}" for problem in problems])
 
     @property
     def folder(self) -> Path:
@@ -159,3 +165,18 @@ class Secondary:
                 dataclasses.replace(shot, annotations=dataclasses.replace(marks, markers=places, depths=all_depths))
             )
         return shots
+
+
+def secondary_problems(section: SecondarySection, folder: Path) -> list[str]:
+    """Return which presets, settings of them, and kinds of pictures ``section`` names that there are not."""
+    problems = []
+    for entry in section.elements:
+        try:
+            check_preset(entry.preset, entry.fields)
+        except ValueError as error:
+            problems.append(f"secondary.elements: {error}")
+    try:
+        plan_output(folder, "frames", section.frames)
+    except ValueError as error:
+        problems.append(f"secondary.frames: {error}")
+    return problems

@@ -57,6 +57,7 @@ class SecondaryStage:
 
     def drive(self) -> list[Driving]:
         """Read dots, align, and find boxes and volumes of every character, where that is out of date."""
+        self.secondary.check()
         dots = DotsStage(self.path, self.overwrite)
         if dots.is_wanted:
             with self._timed("dots"):
@@ -69,7 +70,7 @@ class SecondaryStage:
             found = [stage.run(self._told("volumes")) for stage in self.secondary.stages]
         self.made |= {"align": any(made for _, made in alignments), "volumes": any(made for _, made in found)}
         for alignment, _ in alignments:
-            self.notes += () if alignment is None else alignment.notes
+            self.notes += () if alignment is None else (*alignment.notes, *alignment.warnings)
         drivings = [driving for driving, _ in found]
         for driving in drivings:
             self.notes += driving.notes

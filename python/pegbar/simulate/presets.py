@@ -71,15 +71,19 @@ def preset_elements(
     >>> balls.name, len(balls.radii)
     ('balls', 5)
     """
+    check_preset(kind, settings)
+    values = {field: _value(kind, field, value) for field, value in settings.items()}
+    return PRESETS[kind](**values).build(name or kind, character, ground, seed)
+
+
+def check_preset(kind: str, settings: Mapping[str, Any]) -> None:
+    """Raise ValueError for a preset or a setting of it that does not exist, naming those that do."""
     if kind not in PRESETS:
         raise ValueError(f"no preset {kind!r}: there are {', '.join(PRESETS)}")
-    preset = PRESETS[kind]
-    known = [field.name for field in fields(preset)]
+    known = [field.name for field in fields(PRESETS[kind])]
     for field in settings:
         if field not in known:
             raise ValueError(f"{kind}: no setting {field!r}: there are {', '.join(known)}")
-    values = {field: _value(kind, field, value) for field, value in settings.items()}
-    return preset(**values).build(name or kind, character, ground, seed)
 
 
 def _value(kind: str, field: str, value: Any) -> Any:
