@@ -29,7 +29,9 @@ def secondary(shot: Path, options: BatchOptions | None = None) -> int:
         options.select(stage.secondary.stages[0].bare.frames)
         drivings = stage.drive()
         for note in dict.fromkeys(stage.notes):
-            print(f"pegbar: warning: {note}", file=sys.stderr)
+            print(f"pegbar: note: {note}", file=sys.stderr)
+        for warning in dict.fromkeys(stage.warnings):
+            print(f"pegbar: warning: {warning}", file=sys.stderr)
         print(f"volumes: {_made(stage, 'volumes')}, in {os.path.relpath(stage.secondary.folder)}")
         try:
             scene = stage.simulate(drivings)

@@ -41,13 +41,17 @@ ENGINES = (RapierEngine(), ClothEngine())
 
 @dataclass(eq=False)
 class SecondaryStage:
-    """Runs the stages of the shot file ``path``; ``times`` are seconds a stage, ``notes`` what a user should know."""
+    """Runs the stages of the shot file ``path``.
+
+    ``times`` are seconds a stage, ``notes`` what was assumed, and ``warnings`` what looks wrong.
+    """
 
     path: Path
     overwrite: bool = False
     progress: Progress | None = None
     times: dict[str, float] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
     made: dict[str, bool] = field(default_factory=dict)
 
     @cached_property
@@ -70,10 +74,11 @@ class SecondaryStage:
             found = [stage.run(self._told("volumes")) for stage in self.secondary.stages]
         self.made |= {"align": any(made for _, made in alignments), "volumes": any(made for _, made in found)}
         for alignment, _ in alignments:
-            self.notes += () if alignment is None else (*alignment.notes, *alignment.warnings)
+            self.notes += () if alignment is None else alignment.notes
+            self.warnings += () if alignment is None else alignment.warnings
         drivings = [driving for driving, _ in found]
         for driving in drivings:
-            self.notes += driving.notes
+            self.warnings += driving.notes
         return drivings
 
     def simulate(self, drivings: list[Driving]) -> SimulationScene:
@@ -132,6 +137,7 @@ class SecondaryStage:
             "seconds": {name: round(value, 3) for name, value in self.times.items()},
             "made": self.made,
             "notes": list(dict.fromkeys(self.notes)),
+            "warnings": list(dict.fromkeys(self.warnings)),
         }
 
     @contextmanager

@@ -103,7 +103,8 @@ def _stage_folder(title: str, folder: Path) -> Section:
     small = [path for path in shown if path.stem == "sheet" or path.stat().st_size <= _LARGEST]
     words += [f"Too large for this page: {path}" for path in shown if path not in small]
     pictures = [_picture(path, path.stem) for path in small]
-    return Section(title, words=tuple(words), table=tuple(_rows(values)), pictures=tuple(pictures))
+    wrong = tuple(str(warning) for warning in values.get("warnings", ()))
+    return Section(title, words=tuple(words), warnings=wrong, table=tuple(_rows(values)), pictures=tuple(pictures))
 
 
 def _rows(values: Mapping[str, Any], prefix: str = "") -> list[tuple[str, str]]:
