@@ -131,6 +131,7 @@ def _encode(av: Any, container: Any, codec: Codec, frames: Iterable[ArrayLike], 
             even = 2 if "420" in stream.pix_fmt else 1
             stream.height, stream.width = (-(-side // even) * even for side in shape)
             stream.options = codec.options
+            stream.thread_type, stream.thread_count = "AUTO", 0
         arrays.same_size(f"frames[{index}]", picture, "the first frame", shape)
         image = av.VideoFrame.from_ndarray(_even(picture, stream, alpha), "rgba" if alpha else "rgb24")
         container.mux(stream.encode(image))
