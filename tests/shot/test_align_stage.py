@@ -167,3 +167,16 @@ def test_the_report_has_a_section_for_each_stage_that_has_run(made, capsys):
     assert main(["report", str(made), "-o", str(page)]) == 0
     assert "Out of date" in page.read_text(encoding="utf-8")
     made.write_text(settings)
+
+
+def test_a_clip_without_the_drawn_poses_is_warned_of_however_long_its_limbs(made, test_data, capsys):
+    settings = made.read_text()
+    try:
+        other = test_data / "mocap/bvh/ad_fair1_jumping.bvh"
+        made.write_text(
+            settings.replace('path = "clip.bvh"', f'path = "{other.as_posix()}"') + '\n[align]\noutput = "o"\n'
+        )
+        main(["align", str(made)])
+        assert "warning: the clip does not fit: the limbs of ad_fair1_jumping.bvh are" in capsys.readouterr().err
+    finally:
+        made.write_text(settings)

@@ -33,7 +33,7 @@ from pegbar.shot.plan import Shot
 from pegbar.shot.record import fingerprint, is_up_to_date, write_record
 from pegbar.shot.registered import CameraOptions, Retiming
 
-VERSION = 4
+VERSION = 5
 _SHEET = 24
 
 
@@ -88,6 +88,7 @@ class AlignStage:
             mirrored=choice.view.mirrored,
             swapped=choice.view.swapped,
             notes=(*choice.notes, *alignment.notes),
+            warnings=(*choice.warnings, *alignment.warnings),
         )
         self.folder.mkdir(parents=True, exist_ok=True)
         self._write(drawing, choice, alignment, retiming, progress)

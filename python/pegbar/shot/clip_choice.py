@@ -24,12 +24,13 @@ _SAME_VIEW = 20.0
 
 @dataclass(frozen=True, eq=False)
 class Choice:
-    """A clip, the view of it that the drawing shows, where it is, and what a user should know of the choice."""
+    """A clip, the view of it that the drawing shows, where it is, and what was assumed or looks wrong about it."""
 
     path: Path
     motion: Motion
     view: View
     notes: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
 
 
 def choose_clip(
@@ -50,7 +51,8 @@ def choose_clip(
     if section.path is None:
         assert section.folder is not None
         clips = read_clips(folder / section.folder)
-        best = _best(_search(drawing, list(clips.clips), holds, frame_rate), section.folder)
+        found = _search(drawing, list(clips.clips), holds, frame_rate)
+        best = _best(found, section.folder)
         path = folder / section.folder / best.clip
         motion = read_motion(path)
         notes.append(
@@ -67,7 +69,15 @@ def choose_clip(
         else:
             view = _given_view(section, motion, found)
     notes += motion.report.notes if motion.report is not None else ()
-    return Choice(path, motion, view, tuple(notes))
+    return Choice(path, motion, view, tuple(notes), tuple(_doubts(path.name, found)))
+
+
+def _doubts(name: str, found: Matches) -> list[str]:
+    """What a user should be warned of: no stretch of the clip has the drawn poses, however long its limbs are."""
+    if not found.matches or found.found:
+        return []
+    cost = f"{found.matches[0].cost:.0f} degrees from the drawn ones, over {found.doubtful:.0f}"
+    return [f"the clip does not fit: the limbs of {name} are {cost} (pegbar match shows other clips)"]
 
 
 def read_clip(section: ClipSection, folder: Path, path: Path) -> Motion:
