@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pegbar import FormatError
+from pegbar.io.frames import write_image
 from pegbar.io.recording_file import read_recording
 from tests.io.c3d_files import make_c3d
 from tests.io.damage import check, cuts, flips, outcome, seeded, spoiled_words, swapped_pieces
@@ -139,3 +140,9 @@ def test_names_with_odd_letters_are_paths_too(tmp_path, test_data):
     for name in ("09_01.amc", "09.asf"):
         shutil.copy(test_data / "mocap" / "asfamc" / name, folder / name.replace("09", "(+9"))
     assert len(read_recording(folder / "(+9_01.amc").positions) == 148
+
+
+def test_a_picture_is_no_clip(tmp_path):
+    write_image(tmp_path / "walk.png", np.random.default_rng(1).integers(0, 255, (40, 40, 3), np.uint8))
+    with pytest.raises(FormatError, match="neither its name nor its content"):
+        read_recording(tmp_path / "walk.png")

@@ -53,7 +53,8 @@ def _kind(path: _Path, data: bytes) -> str:
     head = data[: 1 << 16].removeprefix(b"\xef\xbb\xbf").lstrip().upper()
     if head.startswith(b"HIERARCHY"):
         return ".bvh"
-    if len(data) > 512 and data[1] == 0x50:
+    # A PNG file's second byte is a C3D file's too.
+    if len(data) > 512 and data[1] == 0x50 and not data.startswith(b"\x89PNG"):
         return ".c3d"
     if b":FULLY-SPECIFIED" in head:
         return ".amc"
