@@ -96,7 +96,7 @@ def test_several_pictures_stand_in_one_scene(folder):
         (("--size", "big"), "out.gif", "--size: want WIDTHxHEIGHT"),
         (("--color", "red"), "out.gif", "--color: want six"),
         (("--frames", "9-2"), "out.gif", "--frames: want FIRST-LAST"),
-        (("--frames", "2-99"), "out.gif", "within 0 to 5"),
+        (("--frames", "2-99"), "out.gif", "within 1-6"),
         (("--field-of-view", "200"), "out.gif", "--field-of-view: want degrees"),
         (("--map", "left_hand"), "out.gif", "--map: want JOINT=MARKER"),
         (("--transition", "-1"), "out.gif", "--transition: want 0 to 60"),

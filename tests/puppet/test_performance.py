@@ -87,7 +87,7 @@ def test_times_of_the_pictures():
     times, rate = clip_times(motion, 10, 20, 24.0)
     assert times.tolist() == [10, 15, 20]
     assert rate == 24
-    with pytest.raises(ValueError, match="want a range within 0 to 120, got 5 to 121"):
+    with pytest.raises(ValueError, match="want a range within 1-121, got 6-122"):
         clip_times(motion, 5, 121, None)
     with pytest.raises(ValueError, match="frame_rate"):
         clip_times(motion, None, None, -1.0)

@@ -36,7 +36,9 @@ def clip_times(motion: Motion, first: int | None, last: int | None, frame_rate: 
     start = first if first is not None else 1 if motion.rest_frame == 0 and count > 1 else 0
     end = last if last is not None else count - 2 if motion.rest_frame == count - 1 and count > 1 else count - 1
     if not 0 <= start <= end < count:
-        raise ValueError(f"frames: want a range within 0 to {count - 1}, got {start} to {end}")
+        raise ValueError(
+            f"frames: the clip has {count}, counted from 1: want a range within 1-{count}, got {start + 1}-{end + 1}"
+        )
     if frame_rate is None:
         frame_rate = motion.frame_rate / max(1, math.ceil(motion.frame_rate / USUAL_RATE - 0.01))
     if not 0 < frame_rate < math.inf:
