@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pegbar import arrays
-from pegbar.ahead import map_ahead
 from pegbar.io import atomic
+from pegbar.io.ahead import map_ahead
 
 Pixels = NDArray[np.uint8]
 _TO_BGR = {3: cv2.COLOR_RGB2BGR, 4: cv2.COLOR_RGBA2BGRA}

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pegbar import _kernels
-from pegbar.ahead import map_ahead
 from pegbar.puppet.drawn_pose import focal_lengths
 from pegbar.puppet.figure_picture import FigurePicture
 from pegbar.puppet.performance import Performance
@@ -109,14 +108,11 @@ class Stage:
 
         A figure whose clip is shorter than another's begins again.
         """
-        figures = [
-            FigurePicture.of_puppet(performance.puppet, scale * _growth(performance))
-            for performance, scale in zip(self.performances, self.scales, strict=True)
-        ]
-        frames = range(start, len(self) if stop is None else stop)
-        return map_ahead(lambda frame: self._picture(figures, frame), frames)
+        for frame in range(start, len(self) if stop is None else stop):
+            yield self.picture(frame)
 
-    def _picture(self, figures: Sequence[FigurePicture], frame: int) -> Pixels:
+    def picture(self, frame: int) -> Pixels:
+        """Return one of the ``pictures``; threads may draw several at a time."""
         canvas = self._ground(frame)
         for index, performance in enumerate(self.performances):
             own = frame % len(performance)
@@ -127,10 +123,18 @@ class Stage:
             width, height = (high - low).tolist()
             if width < 1 or height < 1:
                 continue
-            drawn = figures[index].draw(mesh - low, performance.triangle_depths(own), (width, height))
+            drawn = self._figures[index].draw(mesh - low, performance.triangle_depths(own), (width, height))
             part = canvas[low[1] : high[1], low[0] : high[0]]
             part[...] = put_over(drawn, part) if self.setting.background == "transparent" else over(drawn, part)
         return canvas
+
+    @cached_property
+    def _figures(self) -> tuple[FigurePicture, ...]:
+        """The figures' textures and meshes, made ready at the size that they have on the canvas."""
+        return tuple(
+            FigurePicture.of_puppet(performance.puppet, scale * _growth(performance))
+            for performance, scale in zip(self.performances, self.scales, strict=True)
+        )
 
     def _ground(self, frame: int) -> Pixels:
         """What is behind the figures: (H, W, 3), or (H, W, 4) and empty."""

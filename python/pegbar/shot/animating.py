@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from pegbar.io.ahead import map_ahead
 from pegbar.io.film import check_film, write_film
 from pegbar.io.frames import PICTURE_SUFFIXES, read_picture
 from pegbar.io.motion import read_motion
@@ -109,7 +110,8 @@ def animate_parts(
     picture = over_paper(read_picture(_picture_of(parts[0]))) if setting.background == "picture" else None
     stage = Stage.of_performances(performances, setting, picture)
     ready = time.perf_counter()
-    write_film(output, _told(stage.pictures(), len(stage), progress), performances[0].frame_rate, alpha=alpha)
+    pictures = map_ahead(stage.picture, range(len(stage)))
+    write_film(output, _told(pictures, len(stage), progress), performances[0].frame_rate, alpha=alpha)
     notes = tuple(dict.fromkeys(note for made in performances for note in (*made.puppet.notes, *made.notes)))
     return Outcome(output, ready - start, time.perf_counter() - start, len(stage), notes)
 
