@@ -6,6 +6,7 @@ A shape is a tuple of sizes: a number is that number, a tuple of numbers is any 
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from types import EllipsisType
 from typing import Any
 
@@ -86,6 +87,17 @@ def same_size(name: str, array: NDArray[Any], other: str, size: tuple[int, ...])
     """Refuse ``array`` unless its rows and columns are ``size``, the rows and columns of argument ``other``."""
     if array.shape[:2] != size[:2]:
         raise ValueError(f"{name}: want {size[0]} rows x {size[1]} columns as {other}, got shape {array.shape}")
+
+
+def images(name: str, values: Iterable[ArrayLike]) -> Iterator[NDArray[np.uint8]]:
+    """Give ``values`` as pictures, as they come, all of the first one's size and channels."""
+    shape: tuple[int, ...] = ()
+    for index, value in enumerate(values):
+        picture = image(f"{name}[{index}]", value, (shape[2],) if shape else (3, 4))
+        if shape:
+            same_size(f"{name}[{index}]", picture, "the first frame", shape)
+        shape = picture.shape
+        yield picture
 
 
 def _plain(name: str, value: ArrayLike, shape: Shape) -> NDArray[Any]:

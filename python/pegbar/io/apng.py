@@ -78,12 +78,10 @@ def _write(file: BinaryIO, encoded: Iterator[tuple[_Patch, bytes]], durations: I
 def _patches(frames: Iterable[ArrayLike]) -> Iterator[_Patch]:
     """What is new in each frame; one pixel where nothing is."""
     before: Pixels | None = None
-    for index, frame in enumerate(frames):
-        picture = arrays.image(f"frames[{index}]", frame, (3, 4) if before is None else (before.shape[2],))
+    for picture in arrays.images("frames", frames):
         if before is None:
             yield _Patch(0, 0, picture)
         else:
-            arrays.same_size(f"frames[{index}]", picture, "the first frame", before.shape)
             changed = (picture != before).any(axis=2)
             rows, columns = np.flatnonzero(changed.any(axis=1)), np.flatnonzero(changed.any(axis=0))
             top, bottom, left, right = (rows[0], rows[-1], columns[0], columns[-1]) if len(rows) else (0, 0, 0, 0)

@@ -46,18 +46,7 @@ def write_gif(path: str | os.PathLike[str], frames: Iterable[ArrayLike], duratio
         For no frames or frames that differ in size or channels.
     """
     with atomic.complete_file(path) as part, open(part, "wb") as file:
-        file.writelines(_encoded(_checked(frames), iter(durations)))
-
-
-def _checked(frames: Iterable[ArrayLike]) -> Iterator[Pixels]:
-    """The frames, all of the first one's size and channels."""
-    shape: tuple[int, ...] = ()
-    for index, frame in enumerate(frames):
-        picture = arrays.image(f"frames[{index}]", frame, (shape[2],) if shape else (3, 4))
-        if shape:
-            arrays.same_size(f"frames[{index}]", picture, "the first frame", shape)
-        shape = picture.shape
-        yield picture
+        file.writelines(_encoded(arrays.images("frames", frames), iter(durations)))
 
 
 def _encoded(frames: Iterator[Pixels], durations: Iterator[int]) -> Iterator[bytes]:

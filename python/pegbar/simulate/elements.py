@@ -107,13 +107,8 @@ class Balls:
     look: Look = field(default_factory=Look)
 
     def __post_init__(self) -> None:
-        centers = arrays.floats("centers", self.centers, ("n", 3))
-        _set(self, "centers", centers)
-        _set(self, "radii", _positive("radii", self.radii, (len(centers),)))
-        velocities = self.velocities if len(self.velocities) else np.zeros_like(centers)
-        _set(self, "velocities", arrays.floats("velocities", velocities, centers.shape))
-        if self.colors is not None:
-            _set(self, "colors", arrays.floats("colors", self.colors, (len(centers), 4), dtype=np.float32))
+        _set_rigid(self)
+        _set(self, "radii", _positive("radii", self.radii, (len(self.centers),)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,13 +128,8 @@ class Boxes:
     look: Look = field(default_factory=Look)
 
     def __post_init__(self) -> None:
-        centers = arrays.floats("centers", self.centers, ("n", 3))
-        _set(self, "centers", centers)
-        _set(self, "sizes", _positive("sizes", self.sizes, centers.shape))
-        velocities = self.velocities if len(self.velocities) else np.zeros_like(centers)
-        _set(self, "velocities", arrays.floats("velocities", velocities, centers.shape))
-        if self.colors is not None:
-            _set(self, "colors", arrays.floats("colors", self.colors, (len(centers), 4), dtype=np.float32))
+        _set_rigid(self)
+        _set(self, "sizes", _positive("sizes", self.sizes, self.centers.shape))
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,6 +155,16 @@ class Prop:
 
 
 Element = Cloth | Balls | Boxes | Prop
+
+
+def _set_rigid(bodies: Balls | Boxes) -> None:
+    """Coerce what balls and boxes have alike: centers, velocities and colors."""
+    centers = arrays.floats("centers", bodies.centers, ("n", 3))
+    _set(bodies, "centers", centers)
+    velocities = bodies.velocities if len(bodies.velocities) else np.zeros_like(centers)
+    _set(bodies, "velocities", arrays.floats("velocities", velocities, centers.shape))
+    if bodies.colors is not None:
+        _set(bodies, "colors", arrays.floats("colors", bodies.colors, (len(centers), 4), dtype=np.float32))
 
 
 def _set(value: object, name: str, field_value: object) -> None:
