@@ -22,6 +22,8 @@ STATIONS = np.linspace(0.12, 0.88, 17)
 _COVERED = 0.1
 # Holds the edges parallel where the stations say little about their slope: few of them, close together.
 _PARALLEL = 0.05
+# No edge is nearer to the axis, in pixels: half a pixel is a line one pixel wide.
+_THINNEST = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,9 +155,10 @@ def _edges(distances: Floats, weights: Floats) -> LimbEdges:
     low = np.where(any_found, np.where(weights > 0, distances, np.inf).min(axis=1), 0.0)
     high = np.where(any_found, np.where(weights > 0, distances, -np.inf).max(axis=1), 0.0)
     half = np.stack([middle - slope / 2, middle + slope / 2], axis=1)
-    # From the last station to the joint an edge goes on as it went, and no farther than the stations allow.
+    # From the last station to the joint an edge goes on as it went, no farther than the stations allow, and not across
+    # the axis: a limb that is narrow at one place would be inside out at its end.
     more = 0.25 * (high - low)
-    half = np.clip(half, (low - more)[:, None], (high + more)[:, None])
+    half = np.clip(half, np.maximum(low - more, _THINNEST)[:, None], (high + more)[:, None])
     half = np.where(any_found[:, None], half, np.nan)
     return LimbEdges(half, (weights == 1).mean(axis=1))
 
