@@ -81,6 +81,14 @@ date is done again. Leaves passes, finished frames, an animation, a contact shee
 Example: pegbar secondary my_shot/shot.toml
 
 Example: pegbar secondary my_shot/shot.toml --frames 1-24""",
+    "export": """Write an aligned shot for other 3D packages: camera, markers in 3D, limbs, frames.
+
+USD, glTF, npz and JSON, and a script that sets up Blender to render passes for the shot. Aligns the shot where that is
+needed and out of date.
+
+Example: pegbar export my_shot/shot.toml -o my_shot/export
+
+Example: pegbar export my_shot/shot.toml --formats usd,npz""",
     "animate": """Let a drawn or photographed figure perform a motion capture clip.
 
 Joints are found beside the picture: AnimatedDrawings' char_cfg.yaml, our annotations or COCO keypoints; a mask as well.
