@@ -29,10 +29,21 @@ FILES: dict[Format, tuple[str, ...]] = {
 }
 
 
+def parse_formats(text: str) -> list[Format]:
+    """Return the formats that ``text`` names, with commas between them; ValueError for one that there is not."""
+    known = {str(kind): kind for kind in FILES}
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    if unknown := [name for name in names if name not in known]:
+        raise ValueError(f"--formats: no format {', '.join(unknown)}: there is {', '.join(known)}")
+    if not names:
+        raise ValueError(f"--formats: want at least one of {', '.join(known)}")
+    return [known[name] for name in dict.fromkeys(names)]
+
+
 def usable_formats(wanted: Sequence[Format]) -> tuple[list[Format], list[str]]:
     """Return those of ``wanted`` whose libraries are there, and for the others how to install them."""
     found, lacking = [], []
-    for kind in dict.fromkeys(wanted):
+    for kind in wanted:
         if kind == "usd" and importlib.util.find_spec("pxr") is None:
             lacking.append(str(MissingExtraError("USD", "usd")))
         else:
