@@ -8,11 +8,13 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pegbar.cli.batch import BatchOptions, progress, run_stage
 from pegbar.errors import SimulationError
-from pegbar.shot.secondary_stage import SecondaryStage
+
+if TYPE_CHECKING:
+    from pegbar.shot.secondary_stage import SecondaryStage
 
 
 def secondary(shot: Path, options: BatchOptions | None = None) -> int:
@@ -23,6 +25,8 @@ def secondary(shot: Path, options: BatchOptions | None = None) -> int:
     shot
         The shot file.
     """
+    from pegbar.shot.secondary_stage import SecondaryStage
+
     options = options or BatchOptions()
     with _bars() as tell:
         stage = SecondaryStage(shot, options.overwrite, tell)
