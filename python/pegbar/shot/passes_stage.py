@@ -117,7 +117,7 @@ class ElementsStage(Stage):
         for place, (shot, scale) in enumerate(zip(shots, (1.0, *self.layers.scales), strict=True), 1):
             drawn = read_drawn(shot, frame)
             notes += drawn.notes
-            check_passes(frame, self.layers.passes.path(frame), drawn, beauty, depth)
+            check_passes(frame, self.layers.passes.path(frame), drawn.alpha.shape, beauty, depth)
             drawn_depth = drawn.depth * np.float32(scale)
             is_last = place == len(shots)
             beauty = depth_composite(

@@ -17,8 +17,8 @@ from pegbar.errors import ShotError
 from pegbar.scene.driving import Driving
 from pegbar.shot.characters import drawn_rows, film_cameras, film_character, seen_by
 from pegbar.shot.driving_stage import DrivingStage
-from pegbar.shot.find import plan_output
-from pegbar.shot.load import load_shot
+from pegbar.shot.find import place_of, plan_output
+from pegbar.shot.load import key_lines, load_shot
 from pegbar.shot.model import ElementEntry, SecondarySection
 from pegbar.shot.plan import Shot
 from pegbar.simulate.elements import Element
@@ -49,7 +49,11 @@ class Secondary:
     def check(self) -> None:
         """Raise ShotError for what the section asks for and there is not, before any work."""
         if problems := secondary_problems(self.section, self.path.absolute().parent):
-            raise ShotError([f"{self.path}: {problem}" for problem in problems])
+            lines = key_lines(self.path.read_text(encoding="utf-8-sig"))
+            keys = [tuple(problem.partition(":")[0].split(".")) for problem in problems]
+            raise ShotError(
+                [f"{place_of(str(self.path), lines, key)}: {line}" for key, line in zip(keys, problems, strict=True)]
+            )
 
     @property
     def folder(self) -> Path:

@@ -76,6 +76,8 @@ class SecondaryStage:
         for alignment, _ in alignments:
             self.notes += () if alignment is None else alignment.notes
             self.warnings += () if alignment is None else alignment.warnings
+        for stage in self.secondary.stages:
+            self.warnings += stage.remarks()
         drivings = [driving for driving, _ in found]
         for driving in drivings:
             self.warnings += driving.notes
