@@ -25,7 +25,7 @@ from pegbar.shot.view import LIGHT, View, lay_under, part_of, seen_window
 from pegbar.simulate.layers import render_shadow, shadow_meshes
 from pegbar.simulate.meshes import Models, volume_meshes
 from pegbar.simulate.passes import Ink, Passes, render_passes
-from pegbar.simulate.scene import SimulationScene
+from pegbar.simulate.scene import BARE, SimulationScene
 
 VERSION = 1
 Floats = NDArray[np.float32]
@@ -91,7 +91,10 @@ class ElementsStage(Stage):
         index, samples, ground = frame - layers.first, layers.section.samples, layers.scene.ground
         camera, meshes = layers.scene.cameras[index], self.models.meshes(layers.cache, index)
         pen = INK.width * camera.image_size[0] / 960
-        casting = [*meshes, *volume_meshes(layers.scene, index)] if layers.section.shadow and ground is not None else []
+        casting = [mesh for mesh in meshes if mesh.object_id < BARE]
+        casting = (
+            [*casting, *volume_meshes(layers.scene, index)] if layers.section.shadow and ground is not None else []
+        )
         window = seen_window(camera, meshes, casting, ground or 0.0, pen)
         part = part_of(camera, window)
         # A shadow of its own is only for the file; without one it is rendered along with the elements.

@@ -135,7 +135,13 @@ class Secondary:
             known = ", ".join(character.name for character in characters)
             raise ValueError(f"{entry.preset}: no character {entry.character!r}: there is {known}")
         return preset_elements(
-            entry.preset, wanted[0], name=entry.name, ground=scene.ground, seed=self.section.seed, **entry.fields
+            entry.preset,
+            wanted[0],
+            name=entry.name,
+            ground=scene.ground,
+            seed=self.section.seed,
+            cameras=scene.cameras,
+            **entry.fields,
         )
 
     def recipe(self) -> str:

@@ -29,14 +29,16 @@ from pegbar.shot.secondary import Secondary
 from pegbar.shot.simulation_stage import SimulationStage
 from pegbar.simulate.cloth import ClothEngine
 from pegbar.simulate.elements import Cloth
-from pegbar.simulate.measures import measure_cloth
+from pegbar.simulate.measures import measure_cloth, measure_particles
+from pegbar.simulate.particles import ParticleEngine
 from pegbar.simulate.rapier import RapierEngine
 from pegbar.simulate.scene import SimulationScene
+from pegbar.simulate.weather import Particles
 
 Progress = Callable[[str, int, int], None]
 _SHEET = 12
 # Balls first, so that cloth can meet them.
-ENGINES = (RapierEngine(), ClothEngine())
+ENGINES = (RapierEngine(), ClothEngine(), ParticleEngine())
 
 
 @dataclass(eq=False)
@@ -181,10 +183,31 @@ def _measured(scene: SimulationScene, cache: DiskCache, first: int) -> dict[str,
                 "stretch_p99": most,
                 "stretch_max": largest,
             }
+    particles = _measured_particles(scene, cache, first)
     every = np.concatenate(stretches)
     return {
         "cloth": cloths,
-        "deepest_penetration_m": max((c["deepest_penetration_m"] for c in cloths.values()), default=None),
+        "particles": particles,
+        "deepest_penetration_m": max(
+            (found["deepest_penetration_m"] for found in (*cloths.values(), *particles.values())), default=None
+        ),
         "height_m": max((character.height for character in scene.characters), default=0.0),
         "stretch_p99": float(np.percentile(every, 99)) if every.size else None,
     }
+
+
+def _measured_particles(scene: SimulationScene, cache: DiskCache, first: int) -> dict[str, Any]:
+    """Of all particles their deepest penetration, with its film frame and limb, and how many there are on average."""
+    found: dict[str, Any] = {}
+    for element in scene.elements:
+        if isinstance(element, Particles):
+            measures = measure_particles(scene, cache, element.name)
+            worst = int(np.argmax(measures.penetration))
+            found[element.name] = {
+                "falling_mean": float(measures.falling.mean()),
+                "settled_mean": float(measures.settled.mean()),
+                "deepest_penetration_m": float(measures.penetration[worst]),
+                "in_frame": first + worst,
+                "in_limb": measures.limb[worst],
+            }
+    return found
