@@ -8,7 +8,7 @@ import pytest
 
 from pegbar.io.motion import read_motion
 from pegbar.io.puppet_input import read_puppet_input
-from pegbar.puppet.limb_ends import LimbEnds
+from pegbar.puppet.extremities import Extremities
 from pegbar.puppet.make import make_puppet
 from pegbar.puppet.performance import perform
 from pegbar.puppet.staging import Setting, Stage
@@ -56,7 +56,7 @@ def test_few_triangles_fold_over_or_are_torn(test_data, name, clip):
 @pytest.mark.parametrize(("name", "clip"), [("char1", "dab"), ("char1", "walk"), ("char2", "walk"), ("char6", "wave")])
 def test_hands_and_feet_are_never_scraps(test_data, name, clip):
     made = performed(test_data, name, clip)
-    ends = LimbEnds.of_puppet(made.puppet)
+    ends = Extremities.of_puppet(made.puppet)
     assert len(ends.bones) == 5
     for end in range(len(made.puppet.bones), len(ends.puppet.bones)):
         own = made.puppet.triangles[ends.puppet.triangle_bone == end]

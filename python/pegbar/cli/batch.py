@@ -8,13 +8,15 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from pegbar.io.numbers import format_frames, parse_frames
-from pegbar.shot.batch import FrameResult, run_frames
-from pegbar.shot.stages import Stage
+
+if TYPE_CHECKING:
+    from pegbar.shot.batch import FrameResult
+    from pegbar.shot.stages import Stage
 
 
 @Parameter(name="*")
@@ -43,6 +45,8 @@ class BatchOptions:
 
 def run_stage(name: str, stage: Stage, options: BatchOptions) -> int:
     """Run ``stage`` over the chosen frames, report, and return the exit code."""
+    from pegbar.shot.batch import run_frames
+
     frames = options.select(stage.shot.frames)
     if not frames:
         raise ValueError("the shot has no frames")

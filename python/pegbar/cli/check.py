@@ -13,10 +13,6 @@ from cyclopts import Parameter
 from pegbar.cli.batch import BatchOptions, progress
 from pegbar.errors import ShotError
 from pegbar.io.numbers import format_frames
-from pegbar.shot.batch import run_frames
-from pegbar.shot.check import CheckStage
-from pegbar.shot.check_sections import section_problems
-from pegbar.shot.plan import open_shot
 
 
 def check(
@@ -32,6 +28,11 @@ def check(
     shot
         The shot file.
     """
+    from pegbar.shot.batch import run_frames
+    from pegbar.shot.check import CheckStage
+    from pegbar.shot.check_sections import section_problems
+    from pegbar.shot.plan import open_shot
+
     try:
         plan = open_shot(shot)
     except ShotError as error:
