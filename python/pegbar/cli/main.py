@@ -93,6 +93,14 @@ contact sheet and a report.
 Example: pegbar secondary demo/shot.toml
 
 Example: pegbar secondary demo/shot.toml --frames 1-4""",
+    "export": """Write an aligned shot for other 3D packages.
+
+Camera, joints in 3D, limbs and ground as USD, glTF, npz and JSON, and a script that sets up Blender to render passes
+for the shot. Aligns the shot where that is needed and out of date.
+
+Example: pegbar export demo/shot.toml
+
+Example: pegbar export demo/shot.toml --formats npz,gltf --output demo/for_layout""",
     "animate": """Let a drawn or photographed figure perform a clip.
 
 Joints are found beside the picture: AnimatedDrawings' char_cfg.yaml, our annotations or COCO keypoints; a mask as
@@ -157,7 +165,8 @@ for command, text in COMMANDS.items():
         for name, help_text in GROUPS[command].items():
             app[command].command(f"pegbar.cli.{command}:{name}", name=name, help=_unwrapped(help_text))
     else:
-        app.command(f"pegbar.cli.{command}:{command}", name=command, help=_unwrapped(text))
+        module = command.replace("-", "_")
+        app.command(f"pegbar.cli.{module}:{module}", name=command, help=_unwrapped(text))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

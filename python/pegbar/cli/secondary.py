@@ -28,7 +28,7 @@ def secondary(shot: Path, options: BatchOptions | None = None) -> int:
     from pegbar.shot.secondary_stage import SecondaryStage
 
     options = options or BatchOptions()
-    with _bars() as tell:
+    with bars() as tell:
         stage = SecondaryStage(shot, options.overwrite, tell)
         options.select(stage.secondary.stages[0].bare.frames)
         drivings = stage.drive()
@@ -71,7 +71,7 @@ def _summarise(stage: SecondaryStage, report: dict[str, Any]) -> None:
 
 
 @contextmanager
-def _bars() -> Iterator[Callable[[str, int, int], None]]:
+def bars() -> Iterator[Callable[[str, int, int], None]]:
     """Give a function that shows a stage's progress: a bar a stage, one after the other."""
     with ExitStack() as stack:
         shown: dict[str, tuple[ExitStack, Callable[[], None]]] = {}
