@@ -68,8 +68,8 @@ def blocks(page: Path) -> list[Block]:
     ]
 
 
-def run(block: Block, folder: Path) -> None:
-    """Run ``block`` in ``folder``, the working directory; fails where it does not do what it shows."""
+def run(block: Block, folder: Path) -> bool:
+    """Run ``block`` in ``folder``, the working directory: True, or a failure where it does not do what it shows."""
     if block.language == "python":
         exec(compile("\n" * block.line + block.text, str(block.page), "exec"), {"__name__": "guide"})
     elif block.language == "sh":
@@ -85,6 +85,7 @@ def run(block: Block, folder: Path) -> None:
     elif block.language == "json":
         (folder / "block.json").write_text(block.text, encoding="utf-8")
         assert read_annotations(folder / "block.json").names, block
+    return True
 
 
 def fill_in(shot: Path) -> None:

@@ -1,6 +1,7 @@
 """What the guide, the README and the commands' help show is run: commands, Python and shot files."""
 
 import shlex
+import shutil
 
 import pytest
 
@@ -31,7 +32,7 @@ def workshop(tmp_path_factory, test_data):
 
 @pytest.fixture
 def here(workshop, monkeypatch):
-    """The workshop as the working directory, its shot file as at first: commands change nothing else that others read."""
+    """The workshop as the working directory, its shot file as at first; nothing else that others read changes."""
     shutil.copy(workshop / "shot.toml", workshop / "my_shot")
     monkeypatch.chdir(workshop)
     return workshop
@@ -39,9 +40,8 @@ def here(workshop, monkeypatch):
 
 @pytest.mark.parametrize("page", RUN, ids=lambda page: page.name)
 def test_what_a_page_shows_runs(page, here):
-    for block in blocks(page):
-        if block.reason is None:
-            run(block, here)
+    wanted = [block for block in blocks(page) if block.reason is None]
+    assert [run(block, here) for block in wanted] == [True] * len(wanted)
 
 
 @pytest.mark.parametrize("example", EXAMPLES)
