@@ -99,6 +99,9 @@ class MovementOptions:
         Literal["near", "always", "never"],
         Parameter(help="Whether limbs drawn otherwise than in the clip stay so: near keeps small differences."),
     ] = "near"
+    feet: Annotated[
+        Literal["locked", "free"], Parameter(help="Whether feet that stand in the clip keep their place on the ground.")
+    ] = "locked"
     transition: Annotated[float, Parameter(help="Seconds from the drawn pose to the clip's first.")] = 0.0
     between: Annotated[float, Parameter(help="Seconds from one clip to the next.")] = 0.3
     loop: Annotated[bool, Parameter(negative="", help="Cut and blend so that it repeats without a jump.")] = False
@@ -117,6 +120,7 @@ class MovementOptions:
             first=first,
             last=last,
             keep=self.keep,
+            feet=self.feet,
             travel=self.travel,
             camera=self.camera,
             transition=self.transition,

@@ -32,7 +32,7 @@ from pegbar.scene.volumes import TaperedCylinders
 from pegbar.shot.align_stage import AlignStage
 from pegbar.shot.drawn import read_labels
 from pegbar.shot.driving import drive
-from pegbar.shot.marks import ALIGNED
+from pegbar.shot.marks import ALIGNED, outside_warnings
 from pegbar.shot.model import SecondarySection
 from pegbar.shot.plan import Shot, open_shot
 from pegbar.shot.record import fingerprint, is_up_to_date, write_record
@@ -100,6 +100,13 @@ class DrivingStage:
                 f"drawing {self.numbers[worst]} with {alignment.errors[worst]:.0f} px"
             )
         return alignment, made
+
+    def remarks(self) -> list[str]:
+        """Return what looks wrong with the annotations; of those that are aligned, `pegbar align` says it."""
+        marks = self.bare.annotations
+        if self.is_aligned or marks is None:
+            return []
+        return outside_warnings(marks, {number: self.bare.marks[number] for number in self.numbers})
 
     def run(self, progress: Callable[[int, int], None] | None = None) -> tuple[Driving, bool]:
         """Find boxes and volumes, or read what is up to date; return them and whether they were made.

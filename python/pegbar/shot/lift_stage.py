@@ -72,7 +72,7 @@ class LiftStage:
         motion = read_clip(shot.settings.clip, shot.folder, Path(alignment.clip_path))
         clip = as_drawn(motion, alignment.mirrored, alignment.swapped, shot.settings.align.floor)
         rate = shot.settings.shot.frame_rate / float(self.align.holds().mean())
-        lifted = lift_drawing(alignment, clip, rate, self._options())
+        lifted = lift_drawing(alignment, clip, rate, self.options())
         self.folder.mkdir(parents=True, exist_ok=True)
         values = quality(alignment, lifted, self.align.numbers)
         values["notes"] = notes(alignment, lifted, self.align.numbers, values, shot.settings.lift.stretch)
@@ -85,7 +85,8 @@ class LiftStage:
         """Whether the results stand and nothing that they depend on has changed."""
         return not self.overwrite and is_up_to_date(self.outputs(), self._recipe(), self._inputs())
 
-    def _options(self) -> LiftOptions:
+    def options(self) -> LiftOptions:
+        """Return what the shot's section means; ValueError or OSError, naming the key or file, for what cannot be."""
         section = self.align.shot.settings.lift
         planted: bool | dict[str, list[Range]] = isinstance(section.planted, bool) and section.planted
         if not isinstance(section.planted, bool):

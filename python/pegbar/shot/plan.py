@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from pegbar.io.sequence import FrameSequence
 from pegbar.layer.matte import Mode
 from pegbar.scene.camera import PerspectiveCamera
 from pegbar.scene.drawing import Drawing
-from pegbar.shot.find import KeyedError, Problems, check_clash, find_input, match_marks, plan_output
+from pegbar.shot.find import KeyedError, Problems, check_clash, find_input, match_marks, place_of, plan_output
 from pegbar.shot.load import key_lines, load_shot
 from pegbar.shot.marks import read_marks
 from pegbar.shot.model import ShotFile, parse_color
@@ -39,7 +40,7 @@ class Shot:
     """A validated shot with its sequences found, its marks read and its frames known.
 
     ``marks`` tells which frame of the annotations belongs to a drawing number; ``matte`` is the one that all frames
-    get.
+    get. ``source`` is the shot file as the user named it, ``lines`` where its keys stand.
     """
 
     settings: ShotFile
@@ -56,6 +57,12 @@ class Shot:
     palette: Palette
     matte: Mode
     outputs: dict[str, FrameSequence]
+    source: str = "options"
+    lines: Mapping[tuple[str, ...], int] = field(default_factory=dict)
+
+    def place(self, key: str) -> str:
+        """Return where ``key`` stands, as ``shot.toml:14``: its own line, or that of the section it would be in."""
+        return place_of(self.source, self.lines, tuple(key.split(".")))
 
     def output(self, key: str, frame: int) -> Path | None:
         """Return where ``frame`` of ``[output] key`` goes, or None where the shot file asks for none."""
@@ -112,7 +119,8 @@ def plan_shot(
         raise ShotError(problems.found)
     rest = inputs["drawing.labels"], inputs["drawing.depth"], beauty, inputs.get("passes.depth") or beauty
     matte = _matte(settings, drawings)
-    return Shot(settings, folder, frames, drawings, exposure, *rest, annotations, marks, palette, matte, outputs)
+    found = settings, folder, frames, drawings, exposure, *rest, annotations, marks, palette, matte, outputs
+    return Shot(*found, source, problems.lines)
 
 
 def _outputs(
