@@ -17,6 +17,7 @@ from pegbar.cli.secondary import secondary
 from pegbar.io import atomic
 from pegbar.io.animation import write_animation
 from pegbar.io.frames import read_picture, write_image
+from pegbar.io.hold import hold
 from pegbar.report.contact_sheet import contact_sheet, over_paper
 from pegbar.report.page import Picture, Section, html_page
 from pegbar.sample.shot import write_sample
@@ -40,6 +41,11 @@ def demo(
     folder
         Where to put it; made if it is not there.
     """
+    with hold(folder):
+        return _make(folder, length, jobs)
+
+
+def _make(folder: Path, length: int, jobs: int | None) -> int:
     start = time.perf_counter()
     with progress("sample", length) as advance:
         path = write_sample(folder, frames=length, workers=jobs, progress=lambda *_: advance())

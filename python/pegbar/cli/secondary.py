@@ -12,6 +12,7 @@ from typing import Any
 
 from pegbar.cli.batch import BatchOptions, progress, run_stage
 from pegbar.errors import SimulationError
+from pegbar.io.hold import hold
 from pegbar.shot.secondary_stage import SecondaryStage
 
 
@@ -24,9 +25,17 @@ def secondary(shot: Path, options: BatchOptions | None = None) -> int:
         The shot file.
     """
     options = options or BatchOptions()
+    stage = SecondaryStage(shot, options.overwrite)
+    options.select(stage.secondary.stages[0].bare.frames)
+    # Wrong settings are told before anything is made, also the folder.
+    stage.secondary.check()
+    with hold(stage.secondary.folder):
+        return _run(stage, options)
+
+
+def _run(stage: SecondaryStage, options: BatchOptions) -> int:
     with _bars() as tell:
-        stage = SecondaryStage(shot, options.overwrite, tell)
-        options.select(stage.secondary.stages[0].bare.frames)
+        stage.progress = tell
         drivings = stage.drive()
         for note in dict.fromkeys(stage.notes):
             print(f"pegbar: note: {note}", file=sys.stderr)
