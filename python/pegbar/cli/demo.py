@@ -12,6 +12,7 @@ from cyclopts import Parameter
 from pegbar.cli.batch import BatchOptions, progress, run_stage
 from pegbar.cli.lift import lift
 from pegbar.cli.secondary import secondary
+from pegbar.io.hold import hold
 
 if TYPE_CHECKING:
     import numpy as np
@@ -36,6 +37,11 @@ def demo(
     folder
         Where to put it; made if it is not there.
     """
+    with hold(folder):
+        return _make(folder, length, jobs)
+
+
+def _make(folder: Path, length: int, jobs: int | None) -> int:
     from pegbar.io import atomic
     from pegbar.report.page import html_page
     from pegbar.sample.shot import write_sample
