@@ -9,14 +9,16 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from pegbar.io.hold import BusyError, hold
 from pegbar.io.numbers import format_frames, parse_frames
-from pegbar.shot.batch import FrameResult, run_frames
-from pegbar.shot.stages import Stage
+
+if TYPE_CHECKING:
+    from pegbar.shot.batch import FrameResult
+    from pegbar.shot.stages import Stage
 
 
 @Parameter(name="*")
@@ -45,6 +47,7 @@ class BatchOptions:
 
 def run_stage(name: str, stage: Stage, options: BatchOptions) -> int:
     """Run ``stage`` over the chosen frames, report, and return the exit code."""
+
     frames = options.select(stage.shot.frames)
     if not frames:
         raise ValueError("the shot has no frames")
@@ -61,10 +64,15 @@ def _alongside(folder: Path) -> Iterator[None]:
             stack.enter_context(hold(folder))
         except BusyError as error:
             print(f"pegbar: note: {str(error).rpartition(':')[0]}: frames may be made twice", file=sys.stderr)
+        except OSError:
+            # Frames that are up to date need no right to write; others say what is wrong themselves.
+            pass
         yield
 
 
 def _run(name: str, stage: Stage, frames: list[int], options: BatchOptions) -> int:
+    from pegbar.shot.batch import run_frames
+
     # Told here, so that no worker is started for frames that need none.
     todo = [frame for frame in frames if not stage.is_done(frame)]
     count = Counter({"up to date": len(frames) - len(todo)})

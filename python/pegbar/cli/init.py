@@ -7,9 +7,6 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from pegbar.io.atomic import complete_file
-from pegbar.shot.start import start_shot
-
 
 def init(
     frames: Path,
@@ -25,6 +22,9 @@ def init(
     frames
         The folder with the drawn frames.
     """
+    from pegbar.io.atomic import complete_file
+    from pegbar.shot.start import start_shot
+
     if not frames.is_dir():
         raise NotADirectoryError(f"{frames}: no such folder")
     target = output or frames / "shot.toml"

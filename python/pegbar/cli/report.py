@@ -9,11 +9,6 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from pegbar.io import atomic
-from pegbar.report.page import html_page
-from pegbar.shot.plan import open_shot
-from pegbar.shot.shot_report import has_results, report_sections
-
 
 def report(
     shot: Path,
@@ -29,6 +24,11 @@ def report(
     shot
         The shot file.
     """
+    from pegbar.io import atomic
+    from pegbar.report.page import html_page
+    from pegbar.shot.plan import open_shot
+    from pegbar.shot.shot_report import has_results, report_sections
+
     found = open_shot(shot, aligned=False)
     sections = report_sections(found)
     if not has_results(sections):

@@ -8,12 +8,14 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pegbar.cli.batch import BatchOptions, progress, run_stage
 from pegbar.errors import SimulationError
 from pegbar.io.hold import hold
-from pegbar.shot.secondary_stage import SecondaryStage
+
+if TYPE_CHECKING:
+    from pegbar.shot.secondary_stage import SecondaryStage
 
 
 def secondary(shot: Path, options: BatchOptions | None = None) -> int:
@@ -24,6 +26,8 @@ def secondary(shot: Path, options: BatchOptions | None = None) -> int:
     shot
         The shot file.
     """
+    from pegbar.shot.secondary_stage import SecondaryStage
+
     options = options or BatchOptions()
     stage = SecondaryStage(shot, options.overwrite)
     options.select(stage.secondary.stages[0].bare.frames)
@@ -34,7 +38,7 @@ def secondary(shot: Path, options: BatchOptions | None = None) -> int:
 
 
 def _run(stage: SecondaryStage, options: BatchOptions) -> int:
-    with _bars() as tell:
+    with bars() as tell:
         stage.progress = tell
         drivings = stage.drive()
         for note in dict.fromkeys(stage.notes):
@@ -76,7 +80,7 @@ def _summarise(stage: SecondaryStage, report: dict[str, Any]) -> None:
 
 
 @contextmanager
-def _bars() -> Iterator[Callable[[str, int, int], None]]:
+def bars() -> Iterator[Callable[[str, int, int], None]]:
     """Give a function that shows a stage's progress: a bar a stage, one after the other."""
     with ExitStack() as stack:
         shown: dict[str, tuple[ExitStack, Callable[[], None]]] = {}

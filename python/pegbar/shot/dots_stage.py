@@ -127,6 +127,10 @@ class DotsStage:
         carried, _ = carry_marks(marks, there, gray if follows else None, average=section.average)
         colors = {name: parse_color(color) for name, color in section.limbs.items()}
         limbs = tuple(replace(limb, color=colors.get(limb.name)) for limb in limbs_between(names))
+        known = [limb.name for limb in limbs]
+        if strange := [name for name in colors if name not in known]:
+            told = f"no limb {', '.join(strange)} between the joints that have dots (there are {', '.join(known)})"
+            raise ShotError([f"{self.path}: dots.limbs: {told}"])
         between = [number for number, key in zip(numbers, keyed, strict=True) if not key]
         return Drawing(
             names=names,
