@@ -63,6 +63,9 @@ def _alongside(folder: Path) -> Iterator[None]:
             stack.enter_context(hold(folder))
         except BusyError as error:
             print(f"pegbar: note: {str(error).rpartition(':')[0]}: frames may be made twice", file=sys.stderr)
+        except OSError:
+            # Frames that are up to date need no right to write; others say what is wrong themselves.
+            pass
         yield
 
 

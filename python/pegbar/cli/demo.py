@@ -12,7 +12,6 @@ from cyclopts import Parameter
 from pegbar.cli.batch import BatchOptions, progress, run_stage
 from pegbar.cli.lift import lift
 from pegbar.cli.secondary import secondary
-from pegbar.io.hold import hold
 
 if TYPE_CHECKING:
     import numpy as np
@@ -37,6 +36,8 @@ def demo(
     folder
         Where to put it; made if it is not there.
     """
+    from pegbar.io.hold import hold
+
     with hold(folder):
         return _make(folder, length, jobs)
 

@@ -49,9 +49,13 @@ def hold(folder: Path) -> Iterator[None]:
     if fcntl is None or place in _held:
         yield
         return
-    place.parent.mkdir(parents=True, exist_ok=True)
-    # Read and write without truncation: the holder's name stands in the file.
-    with open(os.open(place, os.O_RDWR | os.O_CREAT, 0o666), "r+", encoding="utf-8") as file:
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        # Read and write without truncation: the holder's name stands in the file.
+        opened = os.open(place, os.O_RDWR | os.O_CREAT, 0o666)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(folder)) from None
+    with open(opened, "r+", encoding="utf-8") as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
