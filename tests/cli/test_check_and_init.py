@@ -43,15 +43,27 @@ def test_every_problem_is_reported_at_once(tmp_path, capsys):
 
 def test_problems_of_the_shot_file_itself_come_with_lines(tmp_path, capsys):
     shot = make_shot(tmp_path)
-    text = shot.read_text().replace('"d.####.png"', '"e.####.png"').replace('"marks.json"', '"none.json"')
+    text = shot.read_text().replace('"d.####.png"', '"e.####.png"').replace("[48, 32]", "[48]")
+    shot.write_text(text + '[drawing.palette]\n"#ff0000" = "tail"\n')
+    assert run("check", shot) == 1
+    assert f"{shot}:3: shot.size" in capsys.readouterr().err
+    text = text.replace("[48]", "[48, 32]")
     shot.write_text(text + '[drawing.palette]\n"#ff0000" = "tail"\n')
     assert run("check", shot) == 1
     lines = capsys.readouterr().err.splitlines()
-    assert len(lines) == 3
+    assert len(lines) == 2
     assert f"{shot}:6: drawing.frames: " in lines[0]
+    assert f"{shot}:18: drawing.palette.#ff0000: " in lines[1]
+    assert '"tail"' in lines[1]
+    # Where the marks cannot be read, limbs are not complained of.
+    shot.write_text(shot.read_text().replace('"marks.json"', '"none.json"'))
+    assert run("check", shot) == 1
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 2
     assert f"{shot}:8: drawing.annotations: " in lines[1]
-    assert f"{shot}:18: drawing.palette.#ff0000: " in lines[2]
-    assert '"tail"' in lines[2]
+    shot.write_text("[[shot]]\nframes = '1'\n")
+    assert run("check", shot) == 1
+    assert f"{shot}:1: shot: want a section, like [shot] ->" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("told_by", ["file names", "annotations"])

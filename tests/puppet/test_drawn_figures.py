@@ -83,3 +83,14 @@ def test_legs_that_the_clip_keeps_apart_do_not_cross(test_data):
     seen = made.puppet.camera.project(made.poses[:45])
     for joint in ("hip", "knee", "foot"):
         assert (seen[:, names.index(f"left_{joint}"), 0] > seen[:, names.index(f"right_{joint}"), 0] + 10).all(), joint
+
+
+def test_a_clip_s_straight_legs_are_straight_on_tilted_hips(test_data):
+    made = performed(test_data, "char1", "dab")
+    names = made.puppet.names
+    for side in ("left", "right"):
+        hip, knee, foot = (made.poses[0, names.index(f"{side}_{joint}")] for joint in ("hip", "knee", "foot"))
+        thigh, shin = knee - hip, foot - knee
+        bend = np.arccos(thigh @ shin / np.linalg.norm(thigh) / np.linalg.norm(shin))
+        # 38 degrees where both feet are to be on level ground.
+        assert np.degrees(bend) < 32, side

@@ -236,3 +236,20 @@ def test_marks_outside_the_picture_are_warned_of(made, tmp_path, capsys):
     warnings = [line for line in capsys.readouterr().err.splitlines() if "warning: left_hand is marked outside" in line]
     assert len(warnings) == 1
     assert "240 x 136 picture in drawings 3-4, 6" in warnings[0]
+
+
+def test_what_a_killed_run_has_half_written_is_not_up_to_date(made, monkeypatch):
+    """A run with other settings leaves some of its files: back at the first settings all are made again."""
+
+    def killed(*_):
+        raise KeyboardInterrupt
+
+    stage = AlignStage(open_shot(made, aligned=False), overwrite=True)
+    monkeypatch.setattr(AlignStage, "_write", killed)
+    with pytest.raises(KeyboardInterrupt):
+        stage.run()
+    assert all(path.is_file() for path in stage.outputs())
+    assert not AlignStage(open_shot(made, aligned=False)).is_done()
+    monkeypatch.undo()
+    assert main(["align", str(made)]) == 0
+    assert AlignStage(open_shot(made, aligned=False)).is_done()

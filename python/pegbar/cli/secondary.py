@@ -14,6 +14,7 @@ from cyclopts import Parameter
 
 from pegbar.cli.batch import BatchOptions, progress, run_stage
 from pegbar.errors import BlenderError, SimulationError
+from pegbar.io.hold import hold
 
 if TYPE_CHECKING:
     from pegbar.shot.passes_stage import ElementsStage
@@ -39,9 +40,17 @@ def secondary(
     from pegbar.shot.secondary_stage import SecondaryStage
 
     options = options or BatchOptions()
+    stage = SecondaryStage(shot, options.overwrite, engine=engine, renderer=renderer)
+    options.select(stage.secondary.stages[0].bare.frames)
+    # Wrong settings are told before anything is made, also the folder.
+    stage.secondary.check()
+    with hold(stage.secondary.folder):
+        return _run(stage, options)
+
+
+def _run(stage: SecondaryStage, options: BatchOptions) -> int:
     with bars() as tell:
-        stage = SecondaryStage(shot, options.overwrite, tell, engine=engine, renderer=renderer)
-        options.select(stage.secondary.stages[0].bare.frames)
+        stage.progress = tell
         drivings = stage.drive()
         for note in dict.fromkeys(stage.notes):
             print(f"pegbar: note: {note}", file=sys.stderr)

@@ -103,7 +103,9 @@ def plan_shot(
     if beauty is not None and passes is not None and not passes.depth and beauty.suffix.lower() != ".exr":
         problems.call("passes.beauty", _refuse, f"{beauty.pattern} has no depth: passes.depth must name the depth pass")
     annotations = problems.call("drawing.annotations", partial(read_marks, aligned=aligned), settings, folder)
-    palette = problems.call("drawing.palette", _palette, settings, annotations)
+    read = annotations is not None or not drawing.annotations
+    # Without the marks that the shot names nothing can be said of limbs.
+    palette = problems.call("drawing.palette", _palette, settings, annotations) if read else None
     if settings.camera:
         size = settings.shot.size or (annotations.image_size if annotations else (1, 1))
         problems.call("camera.matrix", PerspectiveCamera, settings.camera.matrix, size)

@@ -32,6 +32,7 @@ _MENDS = (
     (r"pattern with a frame number|name that ends in", "correct the pattern"),
     (r"not TOML|not UTF-8", "correct the line"),
     (r"run pegbar align", "pegbar align"),
+    (r"annotations: .*\.(json|ya?ml)", "correct the file (docs: file-formats)"),
     (r"\.exr\b", "render or save the file again"),
     (r"\.(png|tiff?|jpe?g)\b", "save the picture again"),
 )

@@ -24,7 +24,7 @@ from pegbar.report.contact_sheet import over_paper
 from pegbar.report.depth_picture import depth_picture
 from pegbar.shot.drawn import Drawn, drawn_inputs, read_drawn
 from pegbar.shot.plan import Shot
-from pegbar.shot.record import fingerprint, is_up_to_date, write_record
+from pegbar.shot.record import fingerprint, forget, is_up_to_date, write_record
 
 VERSION = 2
 
@@ -54,6 +54,7 @@ class Stage:
         if self.is_done(frame):
             return Outcome(False, tuple(outputs))
         recipe, prints = self._recipe(frame), [fingerprint(path) for path in inputs]
+        forget(outputs)
         notes = self.make(frame)
         write_record(outputs, recipe, prints)
         return Outcome(True, tuple(outputs), notes)
