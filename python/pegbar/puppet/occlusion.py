@@ -145,7 +145,7 @@ def nearest_points(start: Floats, along: Floats, other: Floats, across: Floats) 
     gap = start - other
     ag, bg = (along * gap).sum(-1), (across * gap).sum(-1)
     determinant = aa * bb - ab * ab
-    share = np.where(determinant > 1e-9 * aa * bb, (ab * bg - ag * bb) / np.maximum(determinant, 1e-300), 0.5)
+    share = np.where(determinant > 1e-14 * aa * bb, (ab * bg - ag * bb) / np.maximum(determinant, 1e-300), 0.5)
     share = np.clip(share, 0, 1)
     partner = np.clip((ab * share + bg) / bb, 0, 1)
     share = np.clip((ab * partner - ag) / aa, 0, 1)
