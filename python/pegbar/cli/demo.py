@@ -36,6 +36,13 @@ def demo(
     folder
         Where to put it; made if it is not there.
     """
+    from pegbar.io.hold import hold
+
+    with hold(folder):
+        return _make(folder, length, jobs)
+
+
+def _make(folder: Path, length: int, jobs: int | None) -> int:
     from pegbar.io import atomic
     from pegbar.report.page import html_page
     from pegbar.sample.shot import write_sample

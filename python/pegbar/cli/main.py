@@ -101,6 +101,14 @@ for the shot. Aligns the shot where that is needed and out of date.
 Example: pegbar export demo/shot.toml
 
 Example: pegbar export demo/shot.toml --formats npz,gltf --output demo/for_layout""",
+    "import-passes": """Take passes rendered by another package.
+
+Checks what comes back for an exported shot: frames, sizes, channels, unit, background, planar or radial depth, alpha,
+and the camera. Says what is wrong in one table; writes the passes as pegbar has them and names them in the shot file.
+
+Example: pegbar import-passes demo/shot.toml demo/passes/passes.####.exr --check
+
+Example: pegbar import-passes demo/shot.toml demo/passes/passes.####.exr --output demo/imported""",
     "animate": """Let a drawn or photographed figure perform a clip.
 
 Joints are found beside the picture: AnimatedDrawings' char_cfg.yaml, our annotations or COCO keypoints; a mask as

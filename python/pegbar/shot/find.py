@@ -46,10 +46,14 @@ class Problems:
             return function(*arguments)
         except (ValueError, OSError) as error:
             path = getattr(error, "key", ()) or tuple(key.split("."))
-            line = self.lines.get(path)
-            place = f"{self.source}:{line}" if line else self.source
-            self.found.append(f"{place}: {'.'.join(path)}: {describe(error)}")
+            self.found.append(f"{place_of(self.source, self.lines, path)}: {'.'.join(path)}: {describe(error)}")
             return None
+
+
+def place_of(source: str, lines: Mapping[tuple[str, ...], int], key: tuple[str, ...]) -> str:
+    """Return where ``key`` stands in ``source``: at its line, or at that of the section it would be in."""
+    line = next((lines[key[:size]] for size in range(len(key), 0, -1) if key[:size] in lines), None)
+    return f"{source}:{line}" if line else source
 
 
 def find_input(folder: Path, pattern: str | None) -> FrameSequence | None:
