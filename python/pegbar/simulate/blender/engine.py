@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pegbar.errors import BlenderError
-from pegbar.simulate.blender.cloth import cloth_entry
+from pegbar.simulate.blender.cloth import cloth_entry, colliders
 from pegbar.simulate.blender.locate import Blender
 from pegbar.simulate.blender.process import INSIDE, run_blender
 from pegbar.simulate.cache import Cache
@@ -119,9 +119,11 @@ class BlenderEngine:
             entry, more = body_entry(element, names[element.name])
             job["bodies"].append(entry)
             arrays |= more
+        if cloths:
+            arrays["collider"], arrays["collider_triangles"] = colliders(scene, cache)
         substeps = max(1, round(self.cloth_substeps * 24 / scene.frame_rate))
         for cloth in cloths:
-            entry, more = cloth_entry(scene, cloth, names[cloth.name], cache, substeps, self.self_collision)
+            entry, more = cloth_entry(scene, cloth, names[cloth.name], substeps, self.self_collision)
             job["cloths"].append(entry)
             arrays |= more
         return job, arrays

@@ -30,7 +30,7 @@ def main(folder: Path) -> None:
     material = toon_material(job["light"], job["bands"])
     frames = job["frames"]
     for done, frame in enumerate(frames, 1):
-        set_camera(scene, camera, frame["camera"], job["near"])
+        set_camera(camera, frame["camera"], job["near"])
         objects = load_meshes(scene, folder / frame["meshes"], material)
         scene.render.filepath = str(folder / frame["output"])
         bpy.ops.render.render(write_still=True)
@@ -97,14 +97,13 @@ def set_passes(layer: Any, job: dict[str, Any]) -> None:
     bpy.context.scene.render.line_thickness_mode = "ABSOLUTE"
 
 
-def set_camera(scene: Any, camera: Any, given: dict[str, Any], near: float) -> None:
+def set_camera(camera: Any, given: dict[str, Any], near: float) -> None:
     """Place the camera: its matrix, focal length and principal point, all in pixels and metres."""
-    lens, render = camera.data, scene.render
+    lens = camera.data
     lens.sensor_fit, lens.sensor_width = "HORIZONTAL", 36.0
     lens.lens = given["focal"] * 36.0
     lens.shift_x, lens.shift_y = given["shift"]
     lens.clip_start, lens.clip_end = near, 1e6
-    render.pixel_aspect_x, render.pixel_aspect_y = given["aspect"]
     camera.matrix_world = Matrix(given["matrix"])
 
 
