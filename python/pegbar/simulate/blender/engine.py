@@ -168,7 +168,7 @@ def body_entry(element: Balls | Boxes, name: str) -> tuple[dict[str, Any], Array
     return entry, {f"{name}_{what}": array for what, array in arrays.items()}
 
 
-def read_result(path: Path, scene: SimulationScene, element: Element) -> Arrays:
+def read_result(path: Path, scene: SimulationScene, element: Balls | Boxes | Cloth) -> Arrays:
     """Read what Blender made of ``element``; BlenderError where it is not what was asked for."""
     shapes = {"positions": (scene.frames, _count(element), 3)}
     if isinstance(element, Balls | Boxes):
@@ -196,5 +196,5 @@ def store(scene: SimulationScene, element: Element, result: Arrays, cache: Cache
             cache.write(element.name, frame, state | {"velocities": velocities[frame]})
 
 
-def _count(element: Element) -> int:
-    return len(element.centers) if isinstance(element, Balls | Boxes) else len(element.vertices)
+def _count(element: Balls | Boxes | Cloth) -> int:
+    return len(element.vertices) if isinstance(element, Cloth) else len(element.centers)

@@ -21,8 +21,11 @@ from pegbar.simulate.passes import Ink, Passes
 Floats = NDArray[np.float32]
 #: Blender's depth where there is nothing is 1e10.
 BACKGROUND = 1e9
-#: Blender's object index is a signed 16-bit number.
-LARGEST_ID = 0x7FFF
+#: Blender's object index is a signed 16-bit number: ids from 0xC000 on go half the range lower, and those from 0x4000
+#: on, which no scene has, do not fit.
+UPPER_IDS, LOWER_IDS = 0xC000, 0x4000
+#: Around these and higher ids no ink is drawn (``rust/kernels/ink.rs``).
+BARE = 0xFF00
 #: Vertices nearer than this (metres) are one, so that no line is drawn where a mesh changes its colour.
 SAME = 1e-6
 
@@ -44,7 +47,7 @@ class BlenderJob:
         """Write the job's files; return the EXR files that Blender will write.
 
         A frame is its name, camera and meshes; every camera has the same size. Raises ValueError for sizes that
-        differ and object ids above 32767.
+        differ and object ids that Blender has no room for.
         """
         entries, sizes = [], set()
         for name, camera, meshes in frames:
@@ -107,10 +110,11 @@ def squared(vertices: NDArray[np.float64], view: PerspectiveCamera) -> NDArray[n
 
 def write_meshes(path: Path, meshes: Sequence[Mesh], view: PerspectiveCamera) -> None:
     """Write ``meshes`` that ``view`` sees for Blender: welded, with colours and normals at the triangles' corners."""
-    parts: dict[str, NDArray[Any]] = {"ids": np.array([mesh.object_id for mesh in meshes], np.int32)}
+    parts: dict[str, NDArray[Any]] = {
+        "ids": np.array([_index(mesh.object_id) for mesh in meshes], np.int32),
+        "bare": np.array([mesh.object_id >= BARE for mesh in meshes], bool),
+    }
     for index, mesh in enumerate(meshes):
-        if mesh.object_id > LARGEST_ID:
-            raise ValueError(f"object_id: Blender takes up to {LARGEST_ID}, got {mesh.object_id}")
         vertices, triangles, kept = welded(mesh)
         corners = mesh.triangles[kept]
         assert mesh.normals is not None
@@ -122,6 +126,12 @@ def write_meshes(path: Path, meshes: Sequence[Mesh], view: PerspectiveCamera) ->
         }
     with path.open("wb") as file:
         np.savez(file, **parts)  # type: ignore[arg-type]
+
+
+def _index(object_id: int) -> int:
+    if LOWER_IDS <= object_id < UPPER_IDS:
+        raise ValueError(f"object_id: Blender takes those below {LOWER_IDS} and from {UPPER_IDS} on, got {object_id}")
+    return object_id if object_id < LOWER_IDS else object_id - (UPPER_IDS - LOWER_IDS)
 
 
 def welded(mesh: Mesh) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.bool_]]:
@@ -154,7 +164,8 @@ def passes_of(channels: Mapping[str, NDArray[Any]], samples: int, pen: float) ->
     if beauty is None or depth is None or number is None:
         raise ValueError(f"want Blender's passes Combined, Depth and Object Index, got {', '.join(sorted(channels))}")
     depth = np.where(depth < BACKGROUND, depth, np.inf).astype(np.float32)
-    object_id = np.where(np.isfinite(depth), np.rint(number), 0).astype(np.uint16)
+    index = np.where(np.isfinite(depth), np.rint(number), 0).astype(np.int64)
+    object_id = np.where(index < LOWER_IDS, index, index + UPPER_IDS - LOWER_IDS).astype(np.uint16)
     lines = joined("freestyle")
     if lines is not None:
         drawn = lines[..., 3] > 0
