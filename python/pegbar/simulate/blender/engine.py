@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pegbar.errors import BlenderError
-from pegbar.simulate.blender.cloth import cloth_entry
+from pegbar.simulate.blender.cloth import cloth_entry, colliders
 from pegbar.simulate.blender.locate import Blender
 from pegbar.simulate.blender.process import INSIDE, run_blender
 from pegbar.simulate.cache import Cache
@@ -119,9 +119,11 @@ class BlenderEngine:
             entry, more = body_entry(element, names[element.name])
             job["bodies"].append(entry)
             arrays |= more
+        if cloths:
+            arrays["collider"], arrays["collider_triangles"] = colliders(scene, cache)
         substeps = max(1, round(self.cloth_substeps * 24 / scene.frame_rate))
         for cloth in cloths:
-            entry, more = cloth_entry(scene, cloth, names[cloth.name], cache, substeps, self.self_collision)
+            entry, more = cloth_entry(scene, cloth, names[cloth.name], substeps, self.self_collision)
             job["cloths"].append(entry)
             arrays |= more
         return job, arrays
@@ -166,7 +168,7 @@ def body_entry(element: Balls | Boxes, name: str) -> tuple[dict[str, Any], Array
     return entry, {f"{name}_{what}": array for what, array in arrays.items()}
 
 
-def read_result(path: Path, scene: SimulationScene, element: Element) -> Arrays:
+def read_result(path: Path, scene: SimulationScene, element: Balls | Boxes | Cloth) -> Arrays:
     """Read what Blender made of ``element``; BlenderError where it is not what was asked for."""
     shapes = {"positions": (scene.frames, _count(element), 3)}
     if isinstance(element, Balls | Boxes):
@@ -194,5 +196,5 @@ def store(scene: SimulationScene, element: Element, result: Arrays, cache: Cache
             cache.write(element.name, frame, state | {"velocities": velocities[frame]})
 
 
-def _count(element: Element) -> int:
-    return len(element.centers) if isinstance(element, Balls | Boxes) else len(element.vertices)
+def _count(element: Balls | Boxes | Cloth) -> int:
+    return len(element.vertices) if isinstance(element, Cloth) else len(element.centers)

@@ -21,8 +21,11 @@ from pegbar.simulate.passes import Ink, Passes
 Floats = NDArray[np.float32]
 #: Blender's depth where there is nothing is 1e10.
 BACKGROUND = 1e9
-#: Blender's object index is a signed 16-bit number.
-LARGEST_ID = 0x7FFF
+#: Blender's object index is a signed 16-bit number: ids from 0xC000 on go half the range lower, and those from 0x4000
+#: on, which no scene has, do not fit.
+UPPER_IDS, LOWER_IDS = 0xC000, 0x4000
+#: Around these and higher ids no ink is drawn (``rust/kernels/ink.rs``).
+BARE = 0xFF00
 #: Vertices nearer than this (metres) are one, so that no line is drawn where a mesh changes its colour.
 SAME = 1e-6
 
@@ -43,14 +46,14 @@ class BlenderJob:
     def write(self, folder: Path, frames: Iterable[tuple[str, PerspectiveCamera, Sequence[Mesh]]]) -> list[Path]:
         """Write the job's files; return the EXR files that Blender will write.
 
-        A frame is its name, camera and meshes; every camera has the same size. Raises ValueError for a camera that
-        Blender has not (skewed), and object ids above 32767.
+        A frame is its name, camera and meshes; every camera has the same size. Raises ValueError for sizes that
+        differ and object ids that Blender has no room for.
         """
         entries, sizes = [], set()
         for name, camera, meshes in frames:
             view = camera.scaled(self.samples)
             sizes.add(view.image_size)
-            write_meshes(folder / f"{name}.npz", meshes)
+            write_meshes(folder / f"{name}.npz", meshes, view)
             entries.append({"camera": camera_of(view), "meshes": f"{name}.npz", "output": f"{name}.exr"})
         if len(sizes) != 1:
             raise ValueError(f"frames: want cameras of one size, got {sorted(sizes)}")
@@ -78,45 +81,57 @@ class BlenderJob:
 
 
 def camera_of(view: PerspectiveCamera) -> dict[str, Any]:
-    """Return ``view`` as Blender describes a camera; ValueError for a skewed one.
+    """Return ``view`` as Blender describes a camera, apart from what ``squared`` does.
 
-    ``focal`` is in picture widths, ``shift`` too (x right, y up), ``aspect`` the pixels' sides, ``matrix`` (4, 4) takes
-    camera axes (x right, y up, z backward) to the world.
+    ``focal`` is in picture widths, ``shift`` too (x right, y up), ``matrix`` (4, 4) takes camera axes (x right, y up, z
+    backward) to the world.
     """
     intrinsic, (width, height) = view.intrinsic, view.image_size
-    across, down = intrinsic[0, 0], intrinsic[1, 1]
-    if abs(intrinsic[0, 1]) > 1e-6 * across:
-        raise ValueError(f"camera: Blender has no skewed cameras, and this one's skew is {intrinsic[0, 1]:.3g} px")
-    tall = across / down
     matrix = np.eye(4)
     matrix[:3, :3] = view.rotation.T * (1.0, -1.0, -1.0)
     matrix[:3, 3] = view.position
-    shift = ((width - 1) / 2 - intrinsic[0, 2]) / width, (intrinsic[1, 2] - (height - 1) / 2) * tall / width
-    return {
-        "focal": across / width,
-        "shift": shift,
-        "aspect": (max(1.0, 1 / tall), max(1.0, tall)),
-        "matrix": matrix.tolist(),
+    shift = ((width - 1) / 2 - intrinsic[0, 2]) / width, (intrinsic[1, 2] - (height - 1) / 2) / width
+    return {"focal": intrinsic[0, 0] / width, "shift": shift, "matrix": matrix.tolist()}
+
+
+def squared(vertices: NDArray[np.float64], view: PerspectiveCamera) -> NDArray[np.float64]:
+    """Return ``vertices`` (n, 3) moved so that a camera of square pixels sees them where ``view`` sees these.
+
+    Blender knows no skew, and writes no EXR files of pixels that are not square. Depths stay as they are.
+    """
+    intrinsic = view.intrinsic
+    bend = np.eye(3)
+    bend[0, 1], bend[1, 1] = intrinsic[0, 1] / intrinsic[0, 0], intrinsic[1, 1] / intrinsic[0, 0]
+    if np.abs(bend - np.eye(3)).max() < 1e-9:
+        return vertices
+    moved: NDArray[np.float64] = (vertices - view.position) @ (view.rotation.T @ bend @ view.rotation).T + view.position
+    return moved
+
+
+def write_meshes(path: Path, meshes: Sequence[Mesh], view: PerspectiveCamera) -> None:
+    """Write ``meshes`` that ``view`` sees for Blender: welded, with colours and normals at the triangles' corners."""
+    parts: dict[str, NDArray[Any]] = {
+        "ids": np.array([_index(mesh.object_id) for mesh in meshes], np.int32),
+        "bare": np.array([mesh.object_id >= BARE for mesh in meshes], bool),
     }
-
-
-def write_meshes(path: Path, meshes: Sequence[Mesh]) -> None:
-    """Write ``meshes`` for Blender: welded, with colours and normals at the triangles' corners."""
-    parts: dict[str, NDArray[Any]] = {"ids": np.array([mesh.object_id for mesh in meshes], np.int32)}
     for index, mesh in enumerate(meshes):
-        if mesh.object_id > LARGEST_ID:
-            raise ValueError(f"object_id: Blender takes up to {LARGEST_ID}, got {mesh.object_id}")
         vertices, triangles, kept = welded(mesh)
         corners = mesh.triangles[kept]
         assert mesh.normals is not None
         parts |= {
-            f"vertices_{index}": vertices.astype(np.float32),
+            f"vertices_{index}": squared(vertices, view).astype(np.float32),
             f"triangles_{index}": triangles.astype(np.int32),
             f"colors_{index}": mesh.colors[corners],
             f"normals_{index}": mesh.normals[corners].astype(np.float32),
         }
     with path.open("wb") as file:
         np.savez(file, **parts)  # type: ignore[arg-type]
+
+
+def _index(object_id: int) -> int:
+    if LOWER_IDS <= object_id < UPPER_IDS:
+        raise ValueError(f"object_id: Blender takes those below {LOWER_IDS} and from {UPPER_IDS} on, got {object_id}")
+    return object_id if object_id < LOWER_IDS else object_id - (UPPER_IDS - LOWER_IDS)
 
 
 def welded(mesh: Mesh) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.bool_]]:
@@ -149,7 +164,8 @@ def passes_of(channels: Mapping[str, NDArray[Any]], samples: int, pen: float) ->
     if beauty is None or depth is None or number is None:
         raise ValueError(f"want Blender's passes Combined, Depth and Object Index, got {', '.join(sorted(channels))}")
     depth = np.where(depth < BACKGROUND, depth, np.inf).astype(np.float32)
-    object_id = np.where(np.isfinite(depth), np.rint(number), 0).astype(np.uint16)
+    index = np.where(np.isfinite(depth), np.rint(number), 0).astype(np.int64)
+    object_id = np.where(index < LOWER_IDS, index, index + UPPER_IDS - LOWER_IDS).astype(np.uint16)
     lines = joined("freestyle")
     if lines is not None:
         drawn = lines[..., 3] > 0

@@ -23,6 +23,8 @@ def main(folder: Path) -> None:
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     set_render(scene, job)
+    # Around what is in it no ink is drawn.
+    scene.collection.children.link(bpy.data.collections.new("bare"))
     set_passes(scene.view_layers[0], job)
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
     scene.collection.objects.link(camera)
@@ -30,7 +32,7 @@ def main(folder: Path) -> None:
     material = toon_material(job["light"], job["bands"])
     frames = job["frames"]
     for done, frame in enumerate(frames, 1):
-        set_camera(scene, camera, frame["camera"], job["near"])
+        set_camera(camera, frame["camera"], job["near"])
         objects = load_meshes(scene, folder / frame["meshes"], material)
         scene.render.filepath = str(folder / frame["output"])
         bpy.ops.render.render(write_still=True)
@@ -89,6 +91,8 @@ def set_passes(layer: Any, job: dict[str, Any]) -> None:
         # Blender's angle is the one between the faces' sides: a flat edge has half a turn.
         lines.select_crease = True
         settings.crease_angle = np.pi - ink["crease_angle"]
+    lines.select_by_collection, lines.collection_negation = True, "EXCLUSIVE"
+    lines.collection = bpy.data.collections["bare"]
     # A new line set has no line style of its own when there is no window.
     style = bpy.data.linestyles.new("ink")
     lines.linestyle = style
@@ -97,14 +101,13 @@ def set_passes(layer: Any, job: dict[str, Any]) -> None:
     bpy.context.scene.render.line_thickness_mode = "ABSOLUTE"
 
 
-def set_camera(scene: Any, camera: Any, given: dict[str, Any], near: float) -> None:
+def set_camera(camera: Any, given: dict[str, Any], near: float) -> None:
     """Place the camera: its matrix, focal length and principal point, all in pixels and metres."""
-    lens, render = camera.data, scene.render
+    lens = camera.data
     lens.sensor_fit, lens.sensor_width = "HORIZONTAL", 36.0
     lens.lens = given["focal"] * 36.0
     lens.shift_x, lens.shift_y = given["shift"]
     lens.clip_start, lens.clip_end = near, 1e6
-    render.pixel_aspect_x, render.pixel_aspect_y = given["aspect"]
     camera.matrix_world = Matrix(given["matrix"])
 
 
@@ -177,12 +180,13 @@ def load_meshes(scene: Any, path: Path, material: Any) -> list[Any]:
     """Make the frame's objects; their pass index is their id."""
     objects = []
     with np.load(path, allow_pickle=False) as file:
-        for index, number in enumerate(file["ids"].tolist()):
+        ids = zip(file["ids"].tolist(), file["bare"].tolist(), strict=True)
+        for index, (number, is_bare) in enumerate(ids):
             parts = (file[f"{name}_{index}"] for name in ("vertices", "triangles", "colors", "normals"))
             built = bpy.data.objects.new(f"element_{index}", build_mesh(*parts))
             built.pass_index = number
             built.data.materials.append(material)
-            scene.collection.objects.link(built)
+            (bpy.data.collections["bare"] if is_bare else scene.collection).objects.link(built)
             objects.append(built)
     return objects
 

@@ -18,8 +18,10 @@ from mathutils import Quaternion
 
 #: Half the side of the ground, in metres.
 REACH = 100.0
-#: Frames before the pre-roll in which a cloth is carried from its rest shape to where it begins.
+#: Frames at the start of a run in which a cloth is carried from its rest shape to where it begins.
 LEAD = 3
+#: How strongly the air holds a cloth that settles, in times its usual: in the first frame and in the last.
+SETTLING = (40.0, 4.0)
 
 
 def main(folder: Path) -> None:
@@ -84,6 +86,8 @@ def simulate_bodies(job: dict[str, Any], arrays: dict[str, Any], tell: Progress)
             turns = [place[1] for place in places]
             found[name]["rotations"].append([(turn.x, turn.y, turn.z, turn.w) for turn in turns])
         tell.step()
+    for name, state in found.items():
+        state["positions"][0] = arrays[f"{name}_centers"].tolist()
     return {
         name: {what: np.array(rows, np.float64)[job["pre_roll"] :] for what, rows in state.items()}
         for name, state in found.items()
@@ -110,6 +114,7 @@ def add_limb(scene: Any, index: int, arrays: dict[str, Any]) -> None:
 def add_bodies(scene: Any, bodies: dict[str, Any], arrays: dict[str, Any]) -> list[Any]:
     """The bodies of one set; one with a speed is carried along for a frame and let go."""
     name, made = bodies["name"], []
+    rate = scene.render.fps / scene.render.fps_base
     rows = zip(*(arrays[f"{name}_{what}"] for what in ("centers", "velocities", "sizes")), strict=True)
     for index, (center, velocity, size) in enumerate(rows):
         built = new_object(scene, f"{name}_{index}", *box(size.tolist()))
@@ -121,9 +126,11 @@ def add_bodies(scene: Any, bodies: dict[str, Any], arrays: dict[str, Any]) -> li
         body.linear_damping = body.angular_damping = min(1.0, bodies["damping"])
         body.use_deactivation = False
         if np.any(velocity):
-            step = velocity / (scene.render.fps / scene.render.fps_base)
-            for frame, offset in ((1, 0.0), (2, 1.0)):
-                built.location = (center + offset * step).tolist()
+            step = velocity / rate
+            # Its place a frame later, and a place from which it gets there with the speed that it then has.
+            fall = np.array(scene.gravity) / rate**2
+            for frame, place in ((1, center - fall / 2), (2, center + step + fall / 2)):
+                built.location = place.tolist()
                 built.keyframe_insert("location", frame=frame)
             for frame, held in ((1, True), (2, True), (3, False)):
                 body.kinematic = held
@@ -146,35 +153,78 @@ def make_rigid(built: Any, kind: str, shape: str, *, friction: float, bounce: fl
 def simulate_cloth(
     job: dict[str, Any], cloth: dict[str, Any], arrays: dict[str, Any], folder: Path, tell: Progress
 ) -> Any:
-    """One cloth against the moving collider and the ground; its positions (F, n, 3).
+    """One cloth, settled in the pre-roll and then let go with the speed of its pins; its positions (F, n, 3)."""
+    name, early = cloth["name"], job["pre_roll"]
+    given = {what: arrays[f"{name}_{what}"] for what in ("start", "rest", "pins", "places", "launch", "wind")}
+    run = ClothRun(job, cloth, arrays[f"{name}_triangles"], arrays[f"{name}_seams"], folder, tell)
+    collider, triangles, begin = arrays["collider"], arrays["collider_triangles"], given["start"]
+    if early:
+        still = np.repeat(begin[None], early + LEAD, axis=0)
+        track = held_track(still, given["rest"], given["pins"], given["places"][:1], np.zeros(3))
+        seen = np.concatenate([np.repeat(collider[:1], LEAD, axis=0), collider[:early]])
+        begin = run.frames(track, given, (seen, triangles), given["wind"][:early], settles=True)[-1]
+    whole = np.repeat(begin[None], job["total"] - early + LEAD - 1, axis=0)
+    track = held_track(whole, given["rest"], given["pins"], given["places"], given["launch"])
+    seen = np.concatenate([np.repeat(collider[early : early + 1], LEAD - 1, axis=0), collider[early:]])
+    return run.frames(track, given, (seen, triangles), given["wind"][early:])[LEAD - 1 :]
 
-    Blender takes lengths from the shape in the first frame, so that is the rest shape, all of it held.
+
+def held_track(track: Any, rest: Any, pins: Any, places: Any, launch: Any) -> Any:
+    """Where a cloth is held: its rest shape, where it begins with the speed ``launch`` a frame, then its pins' way.
+
+    The last of the first frames is the film's; ``track`` (T, n, 3) is where it begins.
     """
-    name, total = cloth["name"], job["total"] + LEAD
-    scene = new_scene(job | {"total": total})
-    built = new_object(scene, "cloth", arrays[f"{name}_rest"], arrays[f"{name}_triangles"], arrays[f"{name}_seams"])
-    follow(built, folder / f"{name}.pc2", arrays[f"{name}_track"])
-    hold(built, arrays[f"{name}_pins"].tolist())
-    set_cloth(built, cloth, total)
-    track = arrays[f"{name}_collider"]
-    if track.shape[1]:
-        collider = new_object(scene, "volumes", track[0], arrays["collider_triangles"])
-        follow(collider, folder / f"{name}_collider.pc2", track)
-        add_collision(collider, cloth)
-    if job["ground"] is not None:
-        corners = np.array([(-REACH, 0, -REACH), (-REACH, 0, REACH), (REACH, 0, REACH), (REACH, 0, -REACH)], float)
-        corners[:, 1] = job["ground"]
-        add_collision(new_object(scene, "ground", corners, np.array([(0, 1, 2), (0, 2, 3)])), cloth)
-    if len(arrays[f"{name}_wind"]):
-        add_wind(scene, arrays[f"{name}_wind"])
-    places = np.empty((total, len(built.data.vertices), 3), np.float32)
-    for frame in range(1, total + 1):
-        scene.frame_set(frame)
-        shown = built.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
-        shown.vertices.foreach_get("co", places[frame - 1].reshape(-1))
-        if frame > LEAD:
-            tell.step()
-    return places[LEAD + job["pre_roll"] :].astype(np.float64)
+    track = track.copy()
+    later = np.clip(np.arange(len(track)) - (LEAD - 1), 0, len(places) - 1)
+    track[:, pins] = places[later]
+    for index in range(LEAD - 1):
+        track[index] += (index - (LEAD - 1)) * launch
+    # Turned and moved to lie as near as it can, so that it has not far to go (Kabsch).
+    centered, middle = rest - rest.mean(axis=0), track[0].mean(axis=0)
+    left, _, right = np.linalg.svd(centered.T @ (track[0] - middle))
+    left[:, 2] *= np.sign(np.linalg.det(left @ right))
+    track[0] = centered @ left @ right + middle
+    return track
+
+
+class ClothRun:
+    """Runs one cloth through frames."""
+
+    def __init__(
+        self, job: dict[str, Any], cloth: dict[str, Any], triangles: Any, seams: Any, folder: Path, tell: Progress
+    ) -> None:
+        self.job, self.cloth, self.triangles, self.seams = job, cloth, triangles, seams
+        self.folder, self.tell = folder, tell
+
+    def frames(self, track: Any, given: Any, collider: tuple[Any, Any], wind: Any, *, settles: bool = False) -> Any:
+        """Return positions (T, n, 3) of the frames of ``track``; all is held in the first ones, the pins in all.
+
+        Blender takes lengths from the shape in the first frame: its own setting for a rest shape does nothing where
+        another modifier comes before the cloth (5.0), or at all (4.5).
+        """
+        total, cloth, ground = len(track), self.cloth, self.job["ground"]
+        scene = new_scene(self.job | {"total": total})
+        built = new_object(scene, "cloth", track[0], self.triangles, self.seams)
+        follow(built, self.folder / "cloth.pc2", track)
+        hold(built, given["pins"].tolist())
+        set_cloth(built, cloth, total, settles)
+        if collider[0].shape[1]:
+            volumes = new_object(scene, "volumes", collider[0][0], collider[1])
+            follow(volumes, self.folder / "volumes.pc2", collider[0])
+            add_collision(volumes, cloth)
+        if ground is not None:
+            sides = [(-REACH, ground, -REACH), (-REACH, ground, REACH), (REACH, ground, REACH), (REACH, ground, -REACH)]
+            add_collision(new_object(scene, "ground", np.array(sides), np.array([(0, 1, 2), (0, 2, 3)])), cloth)
+        if len(wind):
+            add_wind(scene, np.concatenate([np.repeat(wind[:1], total - len(wind), axis=0), wind]))
+        places = np.empty((total, len(track[0]), 3), np.float32)
+        for frame in range(1, total + 1):
+            scene.frame_set(frame)
+            shown = built.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+            shown.vertices.foreach_get("co", places[frame - 1].reshape(-1))
+            if frame >= LEAD + settles:
+                self.tell.step()
+        return places.astype(np.float64)
 
 
 def hold(built: Any, pins: list[int]) -> None:
@@ -188,12 +238,18 @@ def hold(built: Any, pins: list[int]) -> None:
         every.keyframe_insert("mask_constant", frame=frame)
 
 
-def set_cloth(built: Any, cloth: dict[str, Any], total: int) -> None:
+def set_cloth(built: Any, cloth: dict[str, Any], total: int, settles: bool) -> None:
     """Give the cloth its material; the stiffnesses come in Blender's terms."""
     modifier = built.modifiers.new("cloth", "CLOTH")
     settings, meets = modifier.settings, modifier.collision_settings
     for key, value in cloth["settings"].items():
         setattr(settings, key, value)
+    if settles:
+        usual = settings.air_damping
+        for frame in range(1, total + 1):
+            share = max(0.0, (frame - LEAD) / max(1, total - LEAD))
+            settings.air_damping = usual * SETTLING[0] ** (1 - share) * SETTLING[1] ** share
+            settings.keyframe_insert("air_damping", frame=frame)
     settings.vertex_group_mass = "pins"
     settings.use_sewing_springs = cloth["sewn"]
     settings.effector_weights.gravity = 1.0

@@ -1,0 +1,164 @@
+"""What Blender simulates, against what must be so."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pegbar.scene.volumes import TaperedCylinders
+from pegbar.simulate.blender.engine import BlenderEngine
+from pegbar.simulate.blender.locate import Blender
+from pegbar.simulate.cache import MemoryCache
+from pegbar.simulate.cloth import ClothEngine
+from pegbar.simulate.elements import Balls, Boxes, Cloth, Pin, Prop
+from pegbar.simulate.engine import simulate_scene
+from pegbar.simulate.materials import Wind
+from pegbar.simulate.measures import measure_cloth
+from pegbar.simulate.scene import Character, PreRoll, SimulationScene
+
+STILL = PreRoll(0, 0)
+
+
+def post(frames: int, *, start=(0.0, 0.0, 0.0), end=(0.0, 1.0, 0.0), step=(0.0, 0.0, 0.0), radius=0.1) -> Character:  # type: ignore[no-untyped-def]
+    """One limb from ``start`` to ``end`` that moves by ``step`` a frame, with a marker above its end."""
+    way = np.arange(frames)[:, None, None] * np.array(step)
+    radii = np.full((frames, 1), radius)
+    volumes = TaperedCylinders(way + np.array(start), way + np.array(end), radii, radii)
+    return Character("post", ("top",), way + np.array(end) + (0, 0.3, 0), ("trunk",), volumes)
+
+
+def sheet(name: str, rows: int, columns: int, step: float, corner: tuple[float, float, float], **more: object) -> Cloth:
+    """A sheet that hangs from ``corner`` along x, its first row pinned where ``more`` says."""
+    down, across = np.meshgrid(np.arange(rows) * step, np.arange(columns) * step, indexing="ij")
+    places = np.stack([corner[0] + across, corner[1] - down, np.full_like(across, corner[2])], -1).reshape(-1, 3)
+    corners = []
+    for i in range(rows - 1):
+        for j in range(columns - 1):
+            a = i * columns + j
+            corners += [(a, a + columns, a + 1), (a + 1, a + columns, a + columns + 1)]
+    return Cloth(name, places, np.array(corners), **more)  # type: ignore[arg-type]
+
+
+def track(cache: MemoryCache, name: str, frames: int, what: str = "positions") -> np.ndarray:
+    return np.array([cache.read(name, frame)[what] for frame in range(frames)])
+
+
+def test_balls_fall_fly_and_rest_as_they_must(blender: Blender) -> None:
+    centers = np.array([[0, 2.0, 0], [1, 0.1, 0], [-1, 1.0, 0]])
+    balls = Balls("balls", centers, np.array([0.1, 0.1, 0.1]), np.array([[0, 0, 0], [0, 0, 0], [0, 2.0, 1.0]]))
+    frames = 49
+    scene = SimulationScene(24, frames, (balls,), ground=0.0, pre_roll=STILL)
+    cache = MemoryCache()
+    simulate_scene(scene, cache, [BlenderEngine(blender)])
+    places = track(cache, "balls", frames)
+    assert np.allclose(places[0], centers, atol=1e-4)
+    time = 12 / 24
+    assert places[12, 0, 1] == pytest.approx(2 - 9.81 / 2 * time**2, abs=0.05)
+    assert np.abs(places[:, 1] - centers[1]).max() < 5e-3
+    # Thrown: as high as its speed takes it, and forwards.
+    assert places[:, 2, 1].max() == pytest.approx(1 + 2**2 / 2 / 9.81, abs=0.06)
+    assert places[12, 2, 2] == pytest.approx(0.5, abs=0.06)
+    assert places[..., 1].min() > 0.1 - 5e-3
+    assert np.allclose(np.linalg.norm(track(cache, "balls", frames, "rotations"), axis=2), 1, atol=1e-4)
+
+
+def test_a_limb_kicks_a_ball_and_a_box_rests_turned_level(blender: Blender) -> None:
+    frames = 30
+    ball = Balls("ball", np.array([[0.5, 0.1, 0.0]]), np.array([0.1]))
+    box = Boxes("box", np.array([[3.0, 0.6, 0.0]]), np.array([[0.2, 0.4, 0.3]]))
+    character = post(frames, start=(0, 0.1, 0), end=(0, 0.5, 0), step=(0.05, 0, 0))
+    scene = SimulationScene(24, frames, (ball, box), (character,), ground=0.0, pre_roll=STILL)
+    cache = MemoryCache()
+    simulate_scene(scene, cache, [BlenderEngine(blender)])
+    x = track(cache, "ball", frames)[:, 0, 0]
+    limb = 0.05 * np.arange(frames)
+    assert x[3] == pytest.approx(0.5, abs=0.01)
+    assert (x[10:] > limb[10:] + 0.15).all()
+    assert track(cache, "box", frames)[-1, 0, 1] == pytest.approx(0.2, abs=0.01)
+
+
+def test_a_cloth_keeps_its_pins_lengths_and_distance(blender: Blender) -> None:
+    frames = 24
+    character = post(frames, step=(0.02, 0, 0))
+    cloth = sheet("flag", 12, 6, 0.04, (-0.1, 1.3, 0.2), pins=(Pin("marker", "top", np.arange(6)),))
+    scene = SimulationScene(24, frames, (cloth,), (character,), ground=0.0)
+    cache = MemoryCache()
+    simulate_scene(scene, cache, [BlenderEngine(blender)])
+    places = track(cache, "flag", frames)
+    expected = cloth.vertices[:6] + np.arange(frames)[:, None, None] * (0.02, 0, 0)
+    assert np.abs(places[:, :6] - expected).max() < 1e-4
+    measures = measure_cloth(scene, cache, "flag")
+    assert measures.penetration.max() < 5e-3
+    assert np.abs(measures.percentiles[:2]).max() < 0.03
+    # It begins with the speed of its pins.
+    speed = (places[1] - places[0]).mean(axis=0) * 24
+    assert speed[0] == pytest.approx(0.48, abs=0.12)
+    assert places[-1, -6:, 1].mean() < 1.0
+
+
+def test_lengths_are_those_of_the_rest_shape(blender: Blender) -> None:
+    # It begins pushed together to a half, and falls open.
+    flat = sheet("curtain", 8, 8, 0.05, (0, 1.5, 0))
+    folded = flat.vertices * (1.0, 0.5, 1.0) + (0, 0.75, 0)
+    folded[:, 2] = 0.02 * np.sin(40 * folded[:, 1])
+    pin = Pin("world", vertices=np.arange(8))
+    cloth = Cloth("curtain", folded, flat.triangles, (pin,), rest=flat.vertices)
+    scene = SimulationScene(24, 20, (cloth,))
+    cache = MemoryCache()
+    simulate_scene(scene, cache, [BlenderEngine(blender)])
+    places = track(cache, "curtain", 20)[-1].reshape(8, 8, 3)
+    assert (places[0, :, 1] - places[-1, :, 1]).mean() == pytest.approx(0.35, rel=0.05)
+
+
+def test_cloth_falls_onto_a_box_and_a_ball_of_another_engine(blender: Blender) -> None:
+    ball = Balls("ball", np.array([[0.0, 0.3, 0.0]]), np.array([0.3]))
+    box = Boxes("box", np.array([[2.0, 0.25, 0.0]]), np.array([[0.5, 0.5, 0.5]]))
+    cloths = []
+    for name, middle in (("over_ball", 0.0), ("over_box", 2.0)):
+        hung = sheet(name, 13, 13, 0.05, (0, 0, 0)).vertices - (0.3, -0.3, 0)
+        flat = np.stack([hung[:, 0] + middle, np.full(len(hung), 0.8), -hung[:, 1]], axis=1)
+        cloths.append(Cloth(name, flat, sheet(name, 13, 13, 0.05, (0, 0, 0)).triangles))
+    scene = SimulationScene(24, 20, (ball, box, *cloths), ground=0.0, pre_roll=STILL)
+    cache = MemoryCache()
+    for frame in range(20):
+        for body in (ball, box):
+            cache.write(body.name, frame, {"positions": body.centers, "rotations": np.array([[0.0, 0, 0, 1]])})
+    engine = BlenderEngine(blender)
+    engine.run(scene, cloths, cache, 0, None)
+    over_ball, over_box = (track(cache, cloth.name, 20)[-1] for cloth in cloths)
+    assert np.linalg.norm(over_ball - ball.centers[0], axis=1).min() > 0.295
+    assert over_ball[:, 1].max() == pytest.approx(0.61, abs=0.03)
+    assert over_box[:, 1].max() == pytest.approx(0.51, abs=0.03)
+    assert over_ball[:, 1].min() < 0.45
+
+
+def test_wind_blows_a_cloth_as_far_as_our_engine_does_within_a_factor(blender: Blender) -> None:
+    cloth = sheet("flag", 10, 6, 0.05, (0, 1.5, 0), pins=(Pin("world", vertices=np.arange(6)),))
+    leaned = {}
+    for name, engine in (("ours", ClothEngine()), ("theirs", BlenderEngine(blender))):
+        scene = SimulationScene(24, 24, (cloth,), wind=Wind((0.0, 0.0, 2.5), 0.0))
+        cache = MemoryCache()
+        simulate_scene(scene, cache, [engine])
+        leaned[name] = track(cache, "flag", 24)[-8:, -6:, 2].mean()
+    assert leaned["ours"] > 0.05
+    assert 0.4 < leaned["theirs"] / leaned["ours"] < 2.5
+
+
+def test_the_same_bits_every_time_and_a_run_that_is_taken_up(blender: Blender) -> None:
+    frames = 8
+    character = post(frames, step=(0.03, 0, 0))
+    cloth = sheet("flag", 6, 4, 0.05, (-0.1, 1.3, 0.2), pins=(Pin("marker", "top", np.arange(4)),))
+    balls = Balls("balls", np.array([[0.2, 0.1, 0.0], [0.25, 0.3, 0.0]]), np.array([0.1, 0.1]))
+    prop = Prop("stick", np.array([[0, 1, 0], [0, 2, 0], [0.1, 1, 0.0]]), np.array([[0, 1, 2]]), Pin("limb", "trunk"))
+    scene = SimulationScene(24, frames, (balls, prop, cloth), (character,), ground=0.0, pre_roll=PreRoll(4, 2))
+    caches = [MemoryCache(), MemoryCache()]
+    told: list[tuple[str, int, int]] = []
+    for cache in caches:
+        simulate_scene(scene, cache, [BlenderEngine(blender)], progress=lambda *step: told.append(step))
+    caches[1].clear("flag", 5)
+    caches[1].clear("balls", 5)
+    simulate_scene(scene, caches[1], [BlenderEngine(blender)])
+    for name in ("balls", "stick", "flag"):
+        assert np.array_equal(track(caches[0], name, frames), track(caches[1], name, frames))
+    assert told[-1] == ("blender", frames, frames)
+    assert [step[1] for step in told[: len(told) // 2]] == sorted(step[1] for step in told[: len(told) // 2])
