@@ -132,3 +132,35 @@ def animal():
         bones=skeleton.bones,
         drives=skeleton.drives,
     )
+
+
+def six_armed():
+    """The person with two more pairs of arms, lower on the trunk."""
+    places = dict(zip(MARKERS, marks(), strict=True))
+    parents = {}
+    for pair, lower in ((2, 0.14), (3, 0.28)):
+        for side in ("left", "right"):
+            above = "chest"
+            for joint in ("shoulder", "elbow", "hand"):
+                x, y, z = STANDING[f"{side}_{joint}"]
+                name = f"{side}_{joint}_{pair}"
+                places[name] = camera().project(np.array([x, y - lower - 0.06 * (joint != "shoulder"), z]))
+                parents[name], above = above, name
+    names, points = tuple(places), np.array(list(places.values()))
+    skeleton = drawn_skeleton(names, points, np.ones(len(names), bool), parents)
+    image, mask = painted(points[: len(MARKERS)])
+    mask, image = mask.astype(np.uint8), np.ascontiguousarray(image)
+    for name, above in parents.items():
+        if above != "chest":
+            ends = [np.rint(places[joint]).astype(int).tolist() for joint in (above, name)]
+            cv2.line(mask, *ends, 1, WIDTHS["arm"])
+            cv2.line(image, *ends, (*COLORS[name.split("_")[0]], 255), WIDTHS["arm"])
+    return PuppetInput(
+        image=image,
+        mask=mask.astype(bool),
+        names=skeleton.names,
+        marks=skeleton.marks,
+        visible=skeleton.visible,
+        bones=skeleton.bones,
+        drives=skeleton.drives,
+    )

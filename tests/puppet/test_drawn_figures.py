@@ -12,6 +12,7 @@ from pegbar.puppet.extremities import Extremities
 from pegbar.puppet.make import make_puppet
 from pegbar.puppet.performance import perform
 from pegbar.puppet.staging import Setting, Stage
+from tests.figures import six_armed
 
 CHARACTERS = "drawings/animated_drawings"
 CLIPS = {"dab": "ad_fair1_dab", "wave": "ad_fair1_wave_hello", "walk": "cmu_07_01"}
@@ -82,7 +83,29 @@ def test_legs_that_the_clip_keeps_apart_do_not_cross(test_data):
     names = made.puppet.names
     seen = made.puppet.camera.project(made.poses[:45])
     for joint in ("hip", "knee", "foot"):
-        assert (seen[:, names.index(f"left_{joint}"), 0] > seen[:, names.index(f"right_{joint}"), 0] + 10).all(), joint
+        assert (seen[:, names.index(f"left_{joint}"), 0] > seen[:, names.index(f"right_{joint}"), 0] + 25).all(), joint
+
+
+def test_a_figure_with_six_arms_moves_them_all(test_data):
+    motion = read_motion(test_data / "mocap/bvh/ad_fair1_dab.bvh")
+    made = perform(make_puppet(six_armed(), motion, completion="flat", field_of_view=np.radians(20)), motion)
+    names = made.puppet.names
+    assert made.puppet.drives["left_hand_3"] == "left_hand"
+    for side in ("left", "right"):
+        forearms = [
+            made.poses[:, names.index(f"{side}_hand{pair}")] - made.poses[:, names.index(f"{side}_elbow{pair}")]
+            for pair in ("", "_2", "_3")
+        ]
+        assert np.ptp(forearms[1], axis=0).max() > 0.3
+        first = forearms[0] / np.linalg.norm(forearms[0], axis=1, keepdims=True)
+        for other in forearms[1:]:
+            alike = (first * other).sum(axis=1) / np.linalg.norm(other, axis=1)
+            assert np.degrees(np.arccos(alike.clip(-1, 1))).mean() < 25
+    stage = Stage.of_performances([made], Setting(size=(240, 240), background="transparent"))
+    for frame in range(0, len(made), 40):
+        covered = (stage.picture(frame)[..., 3] > 100).astype(np.uint8)
+        sizes = np.sort(cv2.connectedComponentsWithStats(covered, connectivity=8)[2][1:, cv2.CC_STAT_AREA])
+        assert sizes[:-1].sum() <= 2, frame
 
 
 def test_a_clip_s_straight_legs_are_straight_on_tilted_hips(test_data):

@@ -137,7 +137,7 @@ def _uneven(poses: Floats, legs: tuple[Leg, ...], drawn: Floats) -> Floats:
 def _steps(puppet: Puppet, poses: Floats, clip: Floats, reference: Floats, feet: list[int], scale: float) -> Floats:
     """Where feet (F, L, 3) go in the clip, as seen from the body and in the figure's scale.
 
-    They are as much farther apart, sideways, as the retargeted ones are on the whole. How far one is before the other
+    They are as far apart, sideways, as the retargeted ones on the whole. How far one is before the other
     in the drawn pose is no part of how the figure walks.
     """
     root = int(np.flatnonzero(puppet.parents < 0)[0])
@@ -145,8 +145,11 @@ def _steps(puppet: Puppet, poses: Floats, clip: Floats, reference: Floats, feet:
     azimuth = np.radians(_facing(puppet, reference) + facing_turn(puppet, clip, reference))
     aside = np.stack([np.cos(azimuth), np.zeros_like(azimuth), -np.sin(azimuth)], axis=1)
     for place, foot in enumerate(feet):
-        apart = ((poses[:, foot] - places[:, place]) * aside).sum(axis=1).mean()
-        places[:, place] += apart * aside
+        wanted, own = (((feet_ - poses[:, root]) * aside).sum(axis=1) for feet_ in (poses[:, foot], places[:, place]))
+        share = wanted.mean() / own.mean() if abs(own.mean()) > 1e-9 else 0.0
+        # Wider steps are wider by as much everywhere; narrower ones are narrower in proportion: they must not cross.
+        apart = (share - 1) * own if 0 < share < 1 else np.full(len(own), wanted.mean() - own.mean())
+        places[:, place] += apart[:, None] * aside
     moved: Floats = places
     return moved
 
