@@ -19,6 +19,7 @@ from pegbar import read_annotations
 from pegbar.cli.main import main
 from pegbar.io.frames import read_picture, write_image
 from pegbar.io.joint_map import read_joint_map
+from pegbar.sample.figure import LABELS, PALETTE
 from pegbar.shot.load import validate_shot
 
 ROOT = Path(__file__).parents[1]
@@ -77,7 +78,7 @@ def run(block: Block, folder: Path) -> bool:
             (folder / "my_shot/shot.toml").unlink(missing_ok=True)
         for command in commands(block.text, folder):
             assert command[0] == "pegbar", f"{block}: only pegbar is run here; mark the block: {command}"
-            assert main(command[1:]) == 0, f"{block}: {shlex.join(command)}"
+            assert call(command) == 0, f"{block}: {shlex.join(command)}"
             if command[1:] == ["init", "my_shot"]:
                 fill_in(folder / "my_shot/shot.toml")
     elif block.language == "toml":
@@ -86,6 +87,15 @@ def run(block: Block, folder: Path) -> bool:
         (folder / "block.json").write_text(block.text, encoding="utf-8")
         assert read_annotations(folder / "block.json").names, block
     return True
+
+
+def call(command: list[str]) -> int:
+    """Run a pegbar ``command`` and return its exit code.
+
+    Few frames are done here: starting workers takes longer.
+    """
+    jobs = ["--jobs", "1"] if command[1] in ("check", "depth", "composite") else []
+    return main([*command[1:], *jobs])
 
 
 def fill_in(shot: Path) -> None:
@@ -147,10 +157,20 @@ def make_workshop(folder: Path, data: Path) -> None:
         make_character(folder / name, data / "drawings/animated_drawings/char1")
     for number in range(1, 13):
         shutil.copy2(demo / f"drawings/dancer.{number:04d}.png", folder / f"d.{number:04d}.png")
-        shutil.copy2(demo / f"labels/labels.{number:04d}.png", folder / f"l.{number:04d}.png")
+        write_image(
+            folder / f"l.{number:04d}.png", without_hair(read_picture(demo / f"labels/labels.{number:04d}.png"))
+        )
         for name in "bz":
             shutil.copy2(demo / f"passes/passes.{number:04d}.exr", folder / f"{name}.{number:04d}.exr")
     shutil.copy2(demo / "annotation.json", folder / "a.json")
+
+
+def without_hair(labels: np.ndarray) -> np.ndarray:
+    """The label picture with limb colours alone, as it is asked for where there is no palette."""
+    limbs = labels.copy()
+    for color, limb in PALETTE.items():
+        limbs[(labels == color).all(axis=2)] = LABELS[limb]
+    return limbs
 
 
 def make_character(target: Path, source: Path) -> None:

@@ -6,7 +6,7 @@ import shutil
 import pytest
 
 from pegbar.cli.main import COMMANDS, GROUPS, main
-from tests.guide import PAGES, REASONS, blocks, commands, make_workshop, run
+from tests.guide import PAGES, REASONS, blocks, call, commands, make_workshop, run
 
 #: So many blocks may stay unrun.
 MOST_UNRUN = 10
@@ -51,7 +51,7 @@ def test_the_examples_of_the_help_run_on_the_demo(example, here):
         # The workshop's own demo was made so, only shorter.
         assert (here / "demo/index.html").exists()
         return
-    assert main(command[1:]) == 0, shlex.join(command)
+    assert call(command) == 0, shlex.join(command)
 
 
 def test_every_command_has_an_example():
