@@ -99,7 +99,9 @@ from .simulate.materials import Look as Look
 from .simulate.materials import RigidMaterial as RigidMaterial
 from .simulate.materials import Wind as Wind
 from .simulate.measures import measure_cloth as measure_cloth
+from .simulate.measures import measure_particles as measure_particles
 from .simulate.meshes import Models as Models
+from .simulate.particles import ParticleEngine as ParticleEngine
 from .simulate.passes import Ink as Ink
 from .simulate.passes import Passes as Passes
 from .simulate.passes import render_passes as render_passes
@@ -108,3 +110,5 @@ from .simulate.rapier import RapierEngine as RapierEngine
 from .simulate.scene import Character as Character
 from .simulate.scene import PreRoll as PreRoll
 from .simulate.scene import SimulationScene as SimulationScene
+from .simulate.weather import ParticleMaterial as ParticleMaterial
+from .simulate.weather import Particles as Particles

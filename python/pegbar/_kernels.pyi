@@ -42,6 +42,7 @@ __all__ = [
     "segment_path",
     "segment_stick_figure",
     "step_cloth",
+    "step_particles",
     "stroke_polyline",
     "time_warp",
     "unpremultiply",
@@ -52,6 +53,7 @@ SOURCES: str
 _Floats = NDArray[np.float32]
 _Doubles = NDArray[np.float64]
 _Indices = NDArray[np.uint32]
+_Place = tuple[float, float, float]
 _Pictures = tuple[_Floats, _Floats, _Floats, NDArray[np.uint16]]
 
 def convert_srgb(pixels: NDArray[np.float32], encode: bool) -> NDArray[np.float32]: ...
@@ -173,6 +175,22 @@ def step_cloth(
     capsules: _Doubles,
     state: tuple[_Doubles, _Doubles],
 ) -> None: ...
+def step_particles(
+    behaviour: tuple[
+        tuple[float, tuple[float, float, float]],
+        float,
+        tuple[float, float],
+        tuple[float, float],
+        tuple[int, float],
+        tuple[float, float, float, float],
+        tuple[_Place, _Place],
+    ],
+    capsules: _Doubles,
+    facets: tuple[_Doubles, _Doubles, _Indices],
+    ground: tuple[float, list[tuple[tuple[float, float], float, bool, _Doubles]]],
+    air: tuple[_Place, _Doubles, float],
+    state: tuple[_Doubles, NDArray[np.int64]],
+) -> _Doubles: ...
 def fit_triangles(shapes: _Doubles, intermediate: _Doubles, triangles: NDArray[np.uint32]) -> _Doubles: ...
 def average_triangles(fitted: _Doubles, triangles: NDArray[np.uint32], count: int) -> _Doubles: ...
 

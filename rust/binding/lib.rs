@@ -20,6 +20,7 @@ mod matte;
 mod over;
 mod paint;
 mod palette;
+mod particles;
 mod pose;
 mod raster;
 mod rim;
@@ -74,6 +75,8 @@ mod _kernels {
     use crate::paint::{fill_polygon, stroke_polyline, unpremultiply};
     #[pymodule_export]
     use crate::palette::palette_labels;
+    #[pymodule_export]
+    use crate::particles::step_particles;
     #[pymodule_export]
     use crate::pose::fit_poses;
     #[pymodule_export]

@@ -75,6 +75,16 @@ impl Capsule {
         low.cmple(high).all() && self.may_touch(self.middle.clamp(low, high), margin)
     }
 
+    /// The point of the axis at a share of its length.
+    pub fn on_axis(&self, share: f64) -> DVec3 {
+        self.start + share * self.length * self.along
+    }
+
+    /// The direction of the axis; a ball's is up.
+    pub fn direction(&self) -> DVec3 {
+        self.along
+    }
+
     /// Distance, normal and place of a point.
     #[inline]
     pub fn nearest(&self, point: DVec3) -> Nearest {

@@ -9,12 +9,13 @@ use crate::error::KernelError;
 use crate::surface::{Scene, Surface};
 use glam::Vec3;
 use rayon::prelude::*;
+use std::ops::RangeInclusive;
 
 /// Widest line in samples.
 const WIDEST: f32 = 256.0;
 
-/// Objects of this id draw no lines of their own: shadows on the ground. Lines of others go over them.
-pub const BARE: u16 = 0xFFFE;
+/// Objects of these ids draw no lines of their own: particles, and shadows on the ground. Lines of others go over them.
+pub const BARE: RangeInclusive<u16> = 0xFF00..=0xFFFE;
 
 /// How lines are drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -153,7 +154,7 @@ impl<'a> Pen<'a> {
         }
         let swap = band.reciprocal[second] > band.reciprocal[first];
         let (nearer, farther) = if swap { (second, first) } else { (first, second) };
-        if self.surface(band, nearer).is_some_and(|surface| surface.object == BARE) {
+        if self.surface(band, nearer).is_some_and(|surface| BARE.contains(&surface.object)) {
             return;
         }
         let ends = self.ends_between(band, nearer, farther);

@@ -33,7 +33,7 @@ def test_every_command_has_its_place():
 
 
 def test_a_command_without_a_place_is_shown_all_the_same():
-    assert "More        new        What is new." in overview({**COMMANDS, "new": "What is new.\n\nMuch."})
+    assert "More        new            What is new." in overview({**COMMANDS, "new": "What is new.\n\nMuch."})
 
 
 @pytest.mark.parametrize("name", COMMANDS)

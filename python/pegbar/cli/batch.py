@@ -47,7 +47,6 @@ class BatchOptions:
 
 def run_stage(name: str, stage: Stage, options: BatchOptions) -> int:
     """Run ``stage`` over the chosen frames, report, and return the exit code."""
-
     frames = options.select(stage.shot.frames)
     if not frames:
         raise ValueError("the shot has no frames")

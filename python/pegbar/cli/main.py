@@ -32,10 +32,10 @@ app = App(
 COMMANDS = {
     "init": """Write a shot file for a folder of drawn frames.
 
-Label pictures, annotations and rendered passes are found by their names; what is missing stands in the file as a
+Label pictures, annotations, dots and rendered passes are found by their names; what is missing stands in the file as a
 comment to fill in.
 
-Example: pegbar init demo --overwrite --output demo/new.toml""",
+Example: pegbar init demo --drawings drawings/dancer.####.png --output demo/new.toml""",
     "check": """Read all that a shot names; report every problem.
 
 Nothing is written.
@@ -92,7 +92,7 @@ contact sheet and a report.
 
 Example: pegbar secondary demo/shot.toml
 
-Example: pegbar secondary demo/shot.toml --frames 1-4 --overwrite""",
+Example: pegbar secondary demo/shot.toml --frames 1-4""",
     "export": """Write an aligned shot for other 3D packages.
 
 Camera, joints in 3D, limbs and ground as USD, glTF, npz and JSON, and a script that sets up Blender to render passes
@@ -101,6 +101,14 @@ for the shot. Aligns the shot where that is needed and out of date.
 Example: pegbar export demo/shot.toml
 
 Example: pegbar export demo/shot.toml --formats npz,gltf --output demo/for_layout""",
+    "import-passes": """Take passes rendered by another package.
+
+Checks what comes back for an exported shot: frames, sizes, channels, unit, background, planar or radial depth, alpha,
+and the camera. Says what is wrong in one table; writes the passes as pegbar has them and names them in the shot file.
+
+Example: pegbar import-passes demo/shot.toml demo/passes/passes.####.exr --check
+
+Example: pegbar import-passes demo/shot.toml demo/passes/passes.####.exr --output demo/imported""",
     "animate": """Let a drawn or photographed figure perform a clip.
 
 Joints are found beside the picture: AnimatedDrawings' char_cfg.yaml, our annotations or COCO keypoints; a mask as
@@ -132,7 +140,7 @@ foot-contact: how much better feet and knees are placed when standing feet take 
 
 Tables are printed and written as CSV, plots as PNG.
 
-Example: pegbar reproduce jain2010-fig9 --data clips -o reproduced""",
+Example: pegbar reproduce jain2009-table1 --data clips -o reproduced""",
 }
 #: Commands that are groups of commands: these are in the group's module.
 GROUPS = {
@@ -149,7 +157,7 @@ Example: pegbar motion info demo/clip.bvh --joints demo/joints.toml""",
 
 Left is blue and right is red, later poses are darker; the line is the floor, the grid is in metres.
 
-Example: pegbar motion plot demo/clip.bvh -o demo/poses.png --frames 0-20x10""",
+Example: pegbar motion plot demo/clip.bvh -o demo/poses.png --frames 0-10x5""",
     }
 }
 

@@ -11,7 +11,7 @@ SECTIONS = {
     "The joints": ("dots", "align"),
     "Three jobs": ("secondary", "lift", "animate"),
     "Pictures": ("depth", "composite"),
-    "Exchange": ("export",),
+    "Exchange": ("export", "import-passes"),
     "Results": ("report", "reproduce"),
 }
 _USAGE = "Hand-drawn animation joined with motion capture.  Usage: pegbar COMMAND ..."

@@ -17,15 +17,22 @@ import sys
 from typing import Any
 
 Row = list[float]
+# Blender's own modules, which are there in Blender alone.
+bpy: Any = None
+bpy_extras: Any = None
+mathutils: Any = None
 #: The view layer with limbs and ground alone, by which `pegbar import-passes` checks camera, unit and kind of depth.
 CHECK = "check"
 SENSOR = 36.0
 GROUND = 10.0
 AROUND, RINGS = 24, 6
+TRACKS = ("start", "end", "start_radius", "end_radius")
 
 
 def main() -> None:
     """Build the scene, and save or render it where that is asked for."""
+    for name in ("bpy", "bpy_extras.object_utils", "mathutils"):
+        globals()[name.partition(".")[0]] = __import__(name)
     arguments = _arguments()
     folder = os.path.dirname(os.path.abspath(__file__))
     with open(os.path.join(folder, "shot.json"), encoding="utf-8") as file:
@@ -35,8 +42,6 @@ def main() -> None:
     apart = _check(shot)
     first, last = shot["frames"][0], shot["frames"][-1]
     print(f"pegbar: {shot['name']}: frames {first}-{last}, markers {apart:.4f} px off at most")
-    import bpy
-
     if arguments.samples:
         bpy.context.scene.cycles.samples = arguments.samples
     if arguments.save:
@@ -57,13 +62,10 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--samples", type=int, help="samples a pixel")
     own = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
     # As a Python library there is no Blender that takes arguments of its own.
-    as_library = os.path.basename(sys.argv[0]) == os.path.basename(__file__)
-    return parser.parse_args(sys.argv[1:] if as_library else own)
+    return parser.parse_args(sys.argv[1:] if os.path.basename(sys.argv[0]) == os.path.basename(__file__) else own)
 
 
 def _build(shot: dict[str, Any], folder: str) -> None:
-    import bpy
-
     scene, taste = bpy.context.scene, bpy.context.preferences.edit
     if not bpy.data.filepath and {thing.name for thing in bpy.data.objects} == {"Camera", "Cube", "Light"}:
         # Blender's own first scene: its cube and camera are nobody's work.
@@ -94,26 +96,24 @@ def _build(shot: dict[str, Any], folder: str) -> None:
 
 def _collection(name: str, parent: Any) -> Any:
     """An empty collection of this name below ``parent``: what stood in it before is gone."""
-    import bpy
-
     found = bpy.data.collections.get(name)
     if found is None:
         found = bpy.data.collections.new(name)
         parent.children.link(found)
-    for thing in list(found.objects):
-        data = thing.data
-        bpy.data.objects.remove(thing)
-        if data is not None and data.users == 0:
-            bpy.data.batch_remove([data])
+    old = [[thing, thing.data] if thing.data else [thing] for thing in found.objects]
+    bpy.data.batch_remove([part for parts in old for part in parts])
     return found
 
 
 def _add(name: str, data: Any, collection: Any) -> Any:
-    import bpy
-
     thing = bpy.data.objects.new(name, data)
     collection.objects.link(thing)
     return thing
+
+
+def _key(thing: Any, frame: int, *paths: str) -> None:
+    for path in paths:
+        thing.keyframe_insert(path, frame=frame)
 
 
 def _upright(place: Row) -> tuple[float, float, float]:
@@ -123,9 +123,6 @@ def _upright(place: Row) -> tuple[float, float, float]:
 
 
 def _camera(shot: dict[str, Any], collection: Any) -> Any:
-    import bpy
-    from mathutils import Matrix
-
     scene, track = bpy.context.scene, shot["camera"]
     width, height = shot["image_size"]
     scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = width, height, 100
@@ -135,28 +132,24 @@ def _camera(shot: dict[str, Any], collection: Any) -> Any:
     data.sensor_fit, data.sensor_width, data.clip_start, data.clip_end = "HORIZONTAL", SENSOR, 0.01, 10000.0
     camera = _add("pegbar camera", data, collection)
     camera.rotation_mode = "QUATERNION"
-    turn, before = Matrix(((1, 0, 0, 0), (0, 0, -1, 0), (0, 1, 0, 0), (0, 0, 0, 1))), None
+    turn, before = mathutils.Matrix(((1, 0, 0, 0), (0, 0, -1, 0), (0, 1, 0, 0), (0, 0, 0, 1))), None
     for row, frame in enumerate(shot["frames"]):
         (wide, tall), (across, down) = track["focal_length"][row], track["principal_point"][row]
         data.lens = SENSOR * wide / width
         data.shift_x = (width / 2 - 0.5 - across) / width
         data.shift_y = (down + 0.5 - height / 2) * wide / tall / width
-        for path in ("lens", "shift_x", "shift_y"):
-            data.keyframe_insert(path, frame=frame)
-        pose = turn @ Matrix(track["to_world"][row])
+        _key(data, frame, "lens", "shift_x", "shift_y")
+        pose = turn @ mathutils.Matrix(track["to_world"][row])
         camera.location, camera.rotation_quaternion = pose.translation, pose.to_quaternion()
         if before is not None and camera.rotation_quaternion.dot(before) < 0:
             camera.rotation_quaternion.negate()
         before = camera.rotation_quaternion.copy()
-        camera.keyframe_insert("location", frame=frame)
-        camera.keyframe_insert("rotation_quaternion", frame=frame)
+        _key(camera, frame, "location", "rotation_quaternion")
     return camera
 
 
 def _drawings(shot: dict[str, Any], folder: str, camera: Any) -> None:
     """The drawings behind the camera's view, each for the frames that show it."""
-    import bpy
-
     shown = [(frame, picture) for frame, picture in zip(shot["frames"], shot["pictures"], strict=True) if picture]
     if not shown:
         return
@@ -172,8 +165,7 @@ def _drawings(shot: dict[str, Any], folder: str, camera: Any) -> None:
     numbers = dict(zip(shot["frames"], shot["drawings"], strict=True))
     if len({picture for _, picture in shown}) < 2:
         return
-    image.source = "SEQUENCE"
-    user, first = behind.image_user, shot["frames"][0]
+    image.source, user, first = "SEQUENCE", behind.image_user, shot["frames"][0]
     user.frame_start, user.frame_duration = first, shot["frames"][-1] - first + 1
     for frame, _ in shown:
         # Blender takes the file whose number is the sequence's frame, from 1 on, plus this offset.
@@ -182,8 +174,6 @@ def _drawings(shot: dict[str, Any], folder: str, camera: Any) -> None:
 
 
 def _ground(shot: dict[str, Any], collection: Any) -> None:
-    import bpy
-
     if shot["ground"] is None:
         return
     mesh = bpy.data.meshes.new("ground")
@@ -202,17 +192,14 @@ def _marker(name: str, places: list[Row | None], frames: list[int], collection: 
     for frame, place in zip(frames, places, strict=True):
         if place is not None:
             marker.location = _upright(place)
-            marker.keyframe_insert("location", frame=frame)
+            _key(marker, frame, "location")
         marker.hide_viewport = place is None
         if None in places:
-            marker.keyframe_insert("hide_viewport", frame=frame)
+            _key(marker, frame, "hide_viewport")
 
 
 def _limb(name: str, limb: dict[str, Any], frames: list[int], collection: Any) -> None:
     """A mesh of two half spheres that hang on an empty each, whose scales are the radii."""
-    import bpy
-    from mathutils import Quaternion, Vector
-
     known = [None not in values for values in zip(*(limb[key] for key in TRACKS), strict=True)]
     if not any(known):
         return
@@ -229,24 +216,19 @@ def _limb(name: str, limb: dict[str, Any], frames: list[int], collection: Any) -
         group.add([i for i, end in enumerate(ends) if end == bool(side)], 1.0, "REPLACE")
         modifier.vertex_group, modifier.object, modifier.falloff_type = group.name, hook, "NONE"
     body.modifiers.new("Collision", "COLLISION")
-    turn, along = Quaternion(), Vector((0.0, 1.0, 0.0))
+    turn, along = mathutils.Quaternion(), mathutils.Vector((0.0, 1.0, 0.0))
     for row, frame in enumerate(frames):
         if known[row]:
-            places = [Vector(_upright(limb[key][row])) for key in ("start", "end")]
+            places = [mathutils.Vector(_upright(limb[key][row])) for key in ("start", "end")]
             axis = places[1] - places[0]
             if axis.length > 1e-9:
                 turn, along = along.rotation_difference(axis) @ turn, axis.normalized()
             for hook, place, key in zip(hooks, places, ("start_radius", "end_radius"), strict=True):
                 hook.location, hook.rotation_quaternion, hook.scale = place, turn, [limb[key][row]] * 3
-                for path in ("location", "rotation_quaternion", "scale"):
-                    hook.keyframe_insert(path, frame=frame)
+                _key(hook, frame, "location", "rotation_quaternion", "scale")
         body.hide_render = body.hide_viewport = not known[row]
         if not all(known):
-            body.keyframe_insert("hide_render", frame=frame)
-            body.keyframe_insert("hide_viewport", frame=frame)
-
-
-TRACKS = ("start", "end", "start_radius", "end_radius")
+            _key(body, frame, "hide_render", "hide_viewport")
 
 
 def _capsule() -> tuple[list[tuple[float, float, float]], list[tuple[int, ...]], list[bool]]:
@@ -271,14 +253,10 @@ def _capsule() -> tuple[list[tuple[float, float, float]], list[tuple[int, ...]],
 
 def _passes(shot: dict[str, Any], pattern: str) -> None:
     """Multilayer EXR with colour, alpha and depth, and a layer to check them by."""
-    import bpy
-
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
-    scene.render.film_transparent = True
-    scene.render.use_compositing = scene.render.use_sequencer = False
-    scene.render.use_file_extension = False
-    scene.render.filepath = pattern
+    scene.render.filepath, scene.render.film_transparent = pattern, True
+    scene.render.use_compositing = scene.render.use_sequencer = scene.render.use_file_extension = False
     settings = scene.render.image_settings
     if hasattr(settings, "media_type"):
         settings.media_type = "MULTI_LAYER_IMAGE"
@@ -288,37 +266,29 @@ def _passes(shot: dict[str, Any], pattern: str) -> None:
     check.cycles.use_denoising = False
     for layer in scene.view_layers:
         if layer.name == CHECK:
-            _only_pegbar(layer.layer_collection)
+            for child in layer.layer_collection.children:
+                child.exclude = child.name != "pegbar"
             continue
         layer.use_pass_combined = layer.use_pass_z = True
         # Limbs cast shadows but are not seen: the drawing is there.
-        limbs = layer.layer_collection.children["pegbar"].children["pegbar limbs"]
-        limbs.indirect_only = True
-
-
-def _only_pegbar(root: Any) -> None:
-    for child in root.children:
-        child.exclude = child.name != "pegbar"
+        layer.layer_collection.children["pegbar"].children["pegbar limbs"].indirect_only = True
 
 
 def _check(shot: dict[str, Any]) -> float:
     """How far Blender sees the markers from where the shot's camera sees them, in pixels, at most."""
-    import bpy
-    from bpy_extras.object_utils import world_to_camera_view
-    from mathutils import Matrix, Vector
-
     scene, worst = bpy.context.scene, 0.0
-    width, height = shot["image_size"]
-    frames = shot["frames"]
+    (width, height), frames = shot["image_size"], shot["frames"]
     for row in sorted({0, len(frames) // 2, len(frames) - 1}):
         scene.frame_set(frames[row])
-        matrix = Matrix([*shot["camera"]["matrix"][row], (0.0, 0.0, 0.0, 1.0)])
+        matrix = mathutils.Matrix([*shot["camera"]["matrix"][row], (0.0, 0.0, 0.0, 1.0)])
         for character in shot["characters"]:
             for places in character["markers"].values():
                 if places[row] is None:
                     continue
-                x, y, depth, _ = matrix @ Vector((*places[row], 1.0))
-                seen = world_to_camera_view(scene, scene.camera, Vector(_upright(places[row])))
+                x, y, depth, _ = matrix @ mathutils.Vector((*places[row], 1.0))
+                seen = bpy_extras.object_utils.world_to_camera_view(
+                    scene, scene.camera, mathutils.Vector(_upright(places[row]))
+                )
                 apart = seen[0] * width - 0.5 - x / depth, (1 - seen[1]) * height - 0.5 - y / depth
                 worst = max(worst, math.hypot(*apart))
     scene.frame_set(frames[0])

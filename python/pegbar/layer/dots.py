@@ -16,6 +16,25 @@ Floats = NDArray[np.float64]
 _RIVAL = 0.5
 
 
+# Fewer pixels of a colour are the rim of a dot, or dirt.
+_SMALLEST = 8
+
+
+def dot_colors(picture: NDArray[np.uint8]) -> list[tuple[int, int, int]]:
+    """Return the colours of dots in ``picture`` (H, W, 3 or 4) uint8: opaque, saturated, of several pixels; by size.
+
+    >>> picture = np.full((9, 9, 3), 255, np.uint8)
+    >>> picture[2:6, 2:6] = (255, 0, 0)
+    >>> dot_colors(picture)
+    [(255, 0, 0)]
+    """
+    pixels = picture[picture[..., 3] == 255] if picture.shape[2] == 4 else picture.reshape(-1, 3)
+    colors, counts = np.unique(pixels[:, :3], axis=0, return_counts=True)
+    vivid = np.ptp(colors.astype(int), axis=1) > 100
+    order = np.argsort(-counts, kind="stable")
+    return [(int(r), int(g), int(b)) for r, g, b in colors[order[(vivid & (counts >= _SMALLEST))[order]]]]
+
+
 @dataclass(frozen=True, eq=False)
 class Dots:
     """Dots found in one picture for N colours.

@@ -26,6 +26,8 @@ Flags = NDArray[np.bool_]
 STANDS = ("locked", "free")
 #: A leg is stretched to this part of its length at most: beyond, the knee would snap.
 _STRETCH = 0.998
+#: One foot stands higher than the other by this part of the figure's height at most.
+_TILT = 0.06
 #: Seconds over which the body sinks so that both feet are reached.
 _SINKING = 0.3
 
@@ -98,6 +100,7 @@ def lock_feet(
     # Feet that stand in the reference are as high there as they are drawn.
     standing = np.array([_stands(reference[leg.foot, 1], clip[contacts[:, leg.side], leg.foot, 1]) for leg in legs])
     raised = standing * (drawn[feet, 1] - floor - scale * reference[feet, 1])
+    raised = np.maximum(raised, raised.min(initial=0) + _uneven(poses, legs, drawn))
     height = scale * clip[:, hips, 1].mean(axis=1) - poses[:, hips, 1].mean(axis=1)
     if standing.any():
         height += drawn[hips, 1].mean() - floor - scale * float(reference[hips, 1].mean())
@@ -109,6 +112,7 @@ def lock_feet(
     targets[..., 1] = floor + scale * clip[:, feet, 1] + raised
     for place, leg in enumerate(legs):
         targets[:, place] += held(targets[:, place] + path, contacts[:, leg.side])
+    result[..., 1] += _rising(poses, result, legs, targets, contacts, frame_rate)[:, None]
     result[..., 1] -= _sinking(puppet, result, legs, targets, drawn, frame_rate)[:, None]
     for place, leg in enumerate(legs):
         _reach(result, leg, targets[:, place], drawn)
@@ -118,6 +122,16 @@ def lock_feet(
 def _stands(height: float, standing: Floats) -> bool:
     """Whether an ankle at ``height`` is as low as it is where it stands (F,)."""
     return bool(len(standing)) and bool(height < np.median(standing) + BEGIN[1])
+
+
+def _uneven(poses: Floats, legs: tuple[Leg, ...], drawn: Floats) -> Floats:
+    """How much higher each foot stands (L,) than the lowest: drawn hips are tilted, and one leg is longer.
+
+    On level ground the other knee would be bent in all poses.
+    """
+    reach = np.array([poses[:, leg.hip, 1].mean() - sum(_lengths(leg, drawn)) for leg in legs])
+    higher: Floats = np.minimum(reach - reach.min(initial=np.inf), _TILT * np.ptp(drawn[:, 1]))
+    return higher
 
 
 def _steps(puppet: Puppet, poses: Floats, clip: Floats, reference: Floats, feet: list[int], scale: float) -> Floats:
@@ -165,6 +179,29 @@ def held(places: Floats, stands: Flags) -> Floats:
     share = (share * share * (3 - 2 * share))[:, None]
     eased: Floats = moves[first] * (1 - share) + moves[second] * share
     return eased
+
+
+def _rising(
+    free: Floats, poses: Floats, legs: tuple[Leg, ...], targets: Floats, contacts: Flags, frame_rate: float
+) -> Floats:
+    """How far (F,) the body rises so that the leg it stands on is as straight as in the poses ``free`` (F, J, 3).
+
+    The drawn legs may be drawn bent, or one longer than the other: at the clip's height knees would bend that do not in
+    the clip. Where no foot stands it rises by what lies between.
+    """
+    lifts = np.full((len(poses), len(legs)), np.inf)
+    for place, leg in enumerate(legs):
+        gap = poses[:, leg.hip] - targets[:, place]
+        length = np.linalg.norm(free[:, leg.hip] - free[:, leg.foot], axis=1)
+        upright = np.sqrt(np.maximum(length**2 - gap[:, 0] ** 2 - gap[:, 2] ** 2, 0))
+        lifts[:, place] = np.where(contacts[:, leg.side], upright - gap[:, 1], np.inf)
+    wanted = lifts.min(axis=1)
+    known = np.flatnonzero(np.isfinite(wanted))
+    if not len(known):
+        return np.zeros(len(poses))
+    filled = np.interp(np.arange(len(poses)), known, wanted[known])
+    smooth: Floats = gaussian_filter1d(np.maximum(filled, 0), _SINKING * frame_rate / 3, mode="nearest")
+    return smooth
 
 
 def _sinking(

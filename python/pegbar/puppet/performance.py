@@ -12,6 +12,7 @@ from pegbar.puppet.asap import AsapShapes
 from pegbar.puppet.clip_poses import clip_markers, clip_times, continued
 from pegbar.puppet.deform import Deformer
 from pegbar.puppet.drawn_pose import drawn_pose
+from pegbar.puppet.extremities import Extremities
 from pegbar.puppet.feet import STANDS, lock_feet, standing_feet, standing_legs
 from pegbar.puppet.occlusion import Pieces, piece_ranks
 from pegbar.puppet.pose_blend import blend_poses, closed_loop, ease
@@ -167,6 +168,9 @@ def perform(puppet: Puppet, motion: Motion | Sequence[Motion], direction: Direct
 
 def deformed_meshes(puppet: Puppet, rest: Floats, poses: Floats, direction: Direction) -> Floats:
     """Return the mesh (F, n, 2) in ``poses`` (F, J, 3); as drawn it shows the pose ``rest`` (J, 3)."""
+    ends = Extremities.of_puppet(puppet)
+    puppet = ends.puppet
+    rest, poses = ends.extended(rest, poses)
     deformer = Deformer(puppet.vertices, puppet.triangles, puppet.handles)
     asap = AsapShapes.of_puppet(puppet, rest, inflation=direction.inflation)
     # Mesh vertices are not exactly on the bones.

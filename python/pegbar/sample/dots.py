@@ -15,9 +15,9 @@ from pegbar.scene.body import limbs_between
 #: Radius of a dot in a picture 960 pixels wide.
 RADIUS = 4.0
 # Three levels a channel keep colours 127 apart; greys, which paper and ink have, are no dots.
-_LEVELS = [color for color in product((255, 128, 0), repeat=3) if len(set(color)) > 1]
+_LEVELS = [(red, green, blue) for red, green, blue in product((255, 128, 0), repeat=3) if len({red, green, blue}) > 1]
 #: The colour of every joint.
-COLORS: dict[str, tuple[int, int, int]] = dict(zip(NAMES, _LEVELS, strict=False))
+COLORS: dict[str, tuple[int, ...]] = dict(zip(NAMES, _LEVELS, strict=False))
 _ENDS = {"hand": "forearm", "foot": "shin"}
 
 _SHOT = """\

@@ -23,8 +23,8 @@ class Mesh:
     colors : (n, 4) or (4,) float
         Straight linear RGBA per vertex, or one for all; alpha in 0..1. Kept as (n, 4) float32.
     object_id : int
-        1 to 65535: the value in the object pass; 0 is the background there. Around 65534, the shadow, no ink lines
-        are drawn.
+        1 to 65535: the value in the object pass; 0 is the background there. Around 65280 to 65534, particles and
+        shadows, no ink lines are drawn.
     normals : (n, 3) float, optional
         Directions at the vertices. None: the mean of the neighbouring triangles' normals, weighted by area. Kept with
         length 1 (a vertex of no triangle keeps a zero).

@@ -234,6 +234,9 @@ class SecondarySection(Section):
     wind: WindSection = WindSection()
     pre_roll: int = Field(default=24, ge=0, le=10_000)
     seed: int = Field(default=0, ge=0)
+    engine: Literal["pegbar", "blender"] = "pegbar"
+    renderer: Literal["pegbar", "blender"] = "pegbar"
+    blender: str | None = None
     samples: int = Field(default=2, ge=1, le=8)
     shadow: bool = True
     passes: bool = True

@@ -10,10 +10,12 @@ from pegbar.io.annotations import read_annotations
 from pegbar.io.frames import read_picture
 from pegbar.io.numbers import format_frames
 from pegbar.io.sequence import FrameSequence, find_sequences
+from pegbar.layer.dots import dot_colors
 from pegbar.shot.record import FOLDER as RECORDS
 
 # Which words in folder or file names say what a sequence holds; the first that fits counts, plain drawings come last.
 _KINDS = {
+    "dots": r"\b(dots?|joints?|marks?)\b",
     "depth": r"\b(z?depth|z)\b",
     "beauty": r"\b(beauty|pass(es)?|renders?|rgba)\b",
     "labels": r"\b(labels?|seg|segmentation|masks?|limbs?|colou?rs?)\b",
@@ -97,6 +99,8 @@ def _text(
     values = {kind: _relative(found[kind][0], folder) for kind in ("labels", "beauty", "depth") if found[kind]}
     if annotations is not None:
         values["annotations"] = annotations.name
+    elif found["dots"]:
+        values["annotations"] = "marks.json"
     taken = {Path(value).parent.as_posix() for value in values.values()}
     own = "depth" if "depth" not in taken else "drawing_depth"
     return f"""\
@@ -129,6 +133,24 @@ frames = "final/final.####.png"
 depth = "{own}/depth.####.exr"
 depth_picture = "{own}/depth.####.png"
 # holdout = "holdout/holdout.####.png"   # the matte that holds the render out, for Nuke or Natron
+
+# [secondary]                # cloth and balls that collide with the drawing: pegbar secondary
+# elements = ["scarves", "skirt", "balls"]
+{_dots(found["dots"], folder)}"""
+
+
+def _dots(found: list[FrameSequence], folder: Path) -> str:
+    """The section for a layer of dots: its colours, for the user to say which joint each is."""
+    if not found:
+        return ""
+    colors = dot_colors(read_picture(found[0].path(found[0].numbers[0])))
+    lines = "\n".join(f'# "#{bytes(color).hex()}" = "left_hand"' for color in colors)
+    return f"""
+[dots]
+frames = {_quoted(_relative(found[0], folder))}
+
+[dots.joints]                # name the joint of each colour, then run: pegbar dots
+{lines}
 """
 
 

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from pegbar import _kernels
 from pegbar.simulate.cache import Cache
-from pegbar.simulate.elements import Balls, Cloth, Element, Prop
+from pegbar.simulate.colliders import Colliders
+from pegbar.simulate.elements import Cloth, Element
 from pegbar.simulate.engine import Progress, refuse_explosion
 from pegbar.simulate.scene import SimulationScene
 from pegbar.simulate.sheet import make_sheet
-from pegbar.simulate.tracks import Volumes, at_times, pin_track
+from pegbar.simulate.tracks import at_times, pin_track
 
 Floats = NDArray[np.float64]
 
@@ -41,8 +42,8 @@ class ClothEngine:
         self, scene: SimulationScene, elements: Sequence[Element], cache: Cache, start: int, progress: Progress | None
     ) -> None:
         """Write frames ``start`` and later of the cloths to ``cache``."""
-        world = _World(scene, cache, max(1, round(self.substeps * 24 / scene.frame_rate)), self.rounds)
-        runs = [_Run(scene, element, world) for element in elements if isinstance(element, Cloth)]
+        world = Colliders(scene, cache, max(1, round(self.substeps * 24 / scene.frame_rate)))
+        runs = [_Run(scene, element, world, self.rounds) for element in elements if isinstance(element, Cloth)]
         with ThreadPoolExecutor(len(runs)) as pool:
             if start == 0:
                 list(pool.map(_Run.settle, runs))
@@ -60,43 +61,11 @@ class ClothEngine:
                     progress(self.name, frame + 1, scene.frames)
 
 
-class _World:
-    """The capsules of a scene at every substep, balls included."""
-
-    def __init__(self, scene: SimulationScene, cache: Cache, substeps: int, rounds: int) -> None:
-        self.substeps, self.rounds = substeps, rounds
-        self._cache = cache
-        self._volumes = Volumes(scene, [element for element in scene.elements if isinstance(element, Prop)])
-        self._balls = [element for element in scene.elements if isinstance(element, Balls)]
-
-    def times(self, first: float) -> Floats:
-        """The substeps (S + 1,) of the frame after time ``first`` in frames, ``first`` included."""
-        return first + np.arange(self.substeps + 1) / self.substeps
-
-    def capsules(self, before: int, after: int) -> Floats:
-        """Rows (S + 1, C, 8) from frame ``before`` to the next, ``after``; negative frames are the pre-roll."""
-        rows = [self._volumes.at(self.times(before))]
-        for balls in self._balls:
-            ends = [self._centers(balls, max(frame, 0)) for frame in (before, after)]
-            share = np.linspace(0, 1, self.substeps + 1)[:, None, None]
-            centers = (1 - share) * ends[0] + share * ends[1]
-            radii = np.broadcast_to(balls.radii[:, None], (*centers.shape[:2], 1))
-            rows.append(np.concatenate([centers, radii, centers, radii], axis=2))
-        return np.ascontiguousarray(np.concatenate(rows, axis=1))
-
-    def _centers(self, balls: Balls, frame: int) -> Floats:
-        there = self._cache.frames(balls.name)
-        if not there:
-            return balls.centers
-        centers: Floats = np.asarray(self._cache.read(balls.name, min(frame, there[-1]))["positions"], np.float64)
-        return centers
-
-
 class _Run:
     """One cloth on its way through the frames."""
 
-    def __init__(self, scene: SimulationScene, cloth: Cloth, world: _World) -> None:
-        self.scene, self.cloth, self.world = scene, cloth, world
+    def __init__(self, scene: SimulationScene, cloth: Cloth, world: Colliders, rounds: int) -> None:
+        self.scene, self.cloth, self.world, self.rounds = scene, cloth, world, rounds
         self.pins, self.places = _pinned(scene, cloth)
         self.sheet = make_sheet(cloth, self.pins)
         self.waves = scene.wind.waves()
@@ -128,7 +97,7 @@ class _Run:
         air = self._air((before + 0.5) / scene.frame_rate) - launch
         _kernels.step_cloth(
             self.sheet.arrays(),
-            (self.sheet.compliances, (step, scene.gravity), forces, self.world.rounds),
+            (self.sheet.compliances, (step, scene.gravity), forces, self.rounds),
             np.ascontiguousarray(air),
             (self.pins.astype(np.uint32), np.ascontiguousarray(targets)),
             capsules,

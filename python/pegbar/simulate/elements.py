@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pegbar import arrays
 from pegbar.simulate.materials import ClothMaterial, Look, RigidMaterial
+from pegbar.simulate.weather import Particles
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -154,7 +155,7 @@ class Prop:
         _set(self, "capsules", arrays.floats("capsules", self.capsules, ("c", 8)))
 
 
-Element = Cloth | Balls | Boxes | Prop
+Element = Cloth | Balls | Boxes | Prop | Particles
 
 
 def _set_rigid(bodies: Balls | Boxes) -> None:

@@ -10,12 +10,14 @@ from scipy.spatial.transform import Rotation
 
 from pegbar.scene.mesh import Mesh, smooth_normals
 from pegbar.simulate.cache import Cache
-from pegbar.simulate.elements import Balls, Boxes, Cloth, Element
+from pegbar.simulate.elements import Balls, Boxes, Cloth, Prop
 from pegbar.simulate.finer import Finer, finer_sheet
 from pegbar.simulate.hulls import hull_triangles, hull_vertices, poses
+from pegbar.simulate.particle_meshes import particle_mesh
 from pegbar.simulate.pattern import sheet_colors
 from pegbar.simulate.scene import SimulationScene
 from pegbar.simulate.tracks import Volumes
+from pegbar.simulate.weather import Particles
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -45,11 +47,18 @@ class Models:
         found: list[Mesh] = []
         for element in self._scene.elements:
             state = cache.read(element.name, frame)
+            if isinstance(element, Particles):
+                camera = self._scene.cameras[frame] if self._scene.cameras else None
+                number = self._scene.object_id(element.name)
+                found.append(particle_mesh(element, state, camera, self._scene.frame_rate, number))
+                continue
             positions = np.asarray(state["positions"], np.float64)
             found += self._of(element, positions, state.get("rotations"))
         return found
 
-    def _of(self, element: Element, positions: Floats, rotations: NDArray[np.float64] | None) -> list[Mesh]:
+    def _of(
+        self, element: Cloth | Balls | Boxes | Prop, positions: Floats, rotations: NDArray[np.float64] | None
+    ) -> list[Mesh]:
         number = self._scene.object_id(element.name)
         if isinstance(element, Cloth):
             return self._sheets[element.name].meshes(positions, number)

@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
+from pegbar.scene.camera import PerspectiveCamera
 from pegbar.simulate.elements import Element
+from pegbar.simulate.falling import Rain, Snow
 from pegbar.simulate.scene import Character
 from pegbar.simulate.standing import Clothesline, FloorBalls
 from pegbar.simulate.wearing import Scarves, Skirt
 
-Preset = Scarves | Skirt | Clothesline | FloorBalls
+Preset = Scarves | Skirt | Clothesline | FloorBalls | Snow | Rain
+#: Presets that fill what the cameras see.
+SEEN = (Snow, Rain)
 PRESETS: Mapping[str, type[Preset]] = {
     "scarves": Scarves,
     "skirt": Skirt,
     "clothesline": Clothesline,
     "balls": FloorBalls,
+    "snow": Snow,
+    "rain": Rain,
 }
 
 
@@ -28,6 +34,7 @@ def preset_elements(
     name: str | None = None,
     ground: float | None = None,
     seed: int = 0,
+    cameras: Sequence[PerspectiveCamera] = (),
     **settings: Any,
 ) -> tuple[Element, ...]:
     """Make the elements of a preset for a character.
@@ -35,7 +42,7 @@ def preset_elements(
     Parameters
     ----------
     kind : str
-        "scarves", "skirt", "clothesline" or "balls".
+        One of ``PRESETS``.
     character : Character
         Whose sizes are taken and who wears what is worn.
     name : str, optional
@@ -44,12 +51,14 @@ def preset_elements(
         Height of the ground in metres; balls need one.
     seed : int
         Makes every choice by chance repeatable.
+    cameras : sequence of PerspectiveCamera
+        What snow and rain fill is what these see; none: what is near the character.
     **settings
         The preset's fields, see its class in ``PRESETS``. Colours may be "#rrggbb" (sRGB).
 
     Returns
     -------
-    tuple of Cloth, Balls or Prop
+    tuple of elements
         For ``SimulationScene.elements``.
 
     Raises
@@ -73,7 +82,10 @@ def preset_elements(
     """
     check_preset(kind, settings)
     values = {field: _value(kind, field, value) for field, value in settings.items()}
-    return PRESETS[kind](**values).build(name or kind, character, ground, seed)
+    preset = PRESETS[kind](**values)
+    if isinstance(preset, SEEN):
+        return preset.build(name or kind, character, ground, seed, cameras)
+    return preset.build(name or kind, character, ground, seed)
 
 
 def check_preset(kind: str, settings: Mapping[str, Any]) -> None:

@@ -16,9 +16,12 @@ from pegbar.scene.camera import PerspectiveCamera
 from pegbar.scene.volumes import TaperedCylinders
 from pegbar.simulate.elements import Cloth, Element, Pin, Prop
 from pegbar.simulate.materials import Wind
+from pegbar.simulate.weather import Particles
 
 Floats = NDArray[np.float64]
 GRAVITY = (0.0, -9.81, 0.0)
+#: No ink is drawn around objects from this id to the shadow's (``BARE`` in ``rust/kernels/ink.rs``).
+BARE = 0xFF00
 _AXES = ("start", "end")
 _RADII = ("start_radius", "end_radius")
 
@@ -100,8 +103,8 @@ class SimulationScene:
         Frames a second.
     frames : int
         Number of frames.
-    elements : tuple of Cloth, Balls, Boxes or Prop
-        Their places count from 1 as object ids in the passes.
+    elements : tuple of Cloth, Balls, Boxes, Prop or Particles
+        Their places count from 1 as object ids in the passes, those of particles from 65281.
     characters : tuple of Character
         Each with ``frames`` frames.
     cameras : tuple of PerspectiveCamera
@@ -163,8 +166,9 @@ class SimulationScene:
         return found[0]
 
     def object_id(self, element: str) -> int:
-        """Return the id of ``element`` in the object pass."""
-        return 1 + [value.name for value in self.elements].index(element)
+        """Return the id of ``element`` in the object pass; no ink is drawn around particles, from ``BARE`` on."""
+        index = 1 + [value.name for value in self.elements].index(element)
+        return index + (BARE if isinstance(self.elements[index - 1], Particles) else 0)
 
     def _check_pin(self, element: str, pin: Pin) -> None:
         if pin.kind == "world":
