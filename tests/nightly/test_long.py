@@ -37,20 +37,39 @@ def test_a_4k_frame_is_composited(tmp_path):
     assert shot.output("frames", 1).is_file()
 
 
+def peak(tmp_path, name, commands):
+    """Run commands in a process of its own; return the most memory that it or one of its workers took, in MB."""
+    code = (
+        "import resource; from pegbar.cli.main import main\n"
+        "if __name__ == '__main__':\n"
+        f"    for command in {commands!r}:\n"
+        "        assert main(command) == 0, command\n"
+        "    both = resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN\n"
+        "    print(max(resource.getrusage(who).ru_maxrss for who in both))"
+    )
+    script = tmp_path / f"{name}.py"
+    script.write_text(code)
+    out = subprocess.run([sys.executable, script], check=True, capture_output=True, text=True).stdout
+    return int(out.splitlines()[-1]) / 1024
+
+
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_memory_does_not_grow_with_the_number_of_frames(tmp_path, jobs):
-    peaks = []
-    for count in (50, 500):
-        shot = make_shot(tmp_path / str(count), count)
-        code = (
-            "import resource, sys; from pegbar.cli.main import main\n"
-            f"if __name__ == '__main__':\n"
-            f"    assert main(['composite', {str(shot)!r}, '--jobs', '{jobs}']) == 0\n"
-            "    both = resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN\n"
-            "    print(max(resource.getrusage(who).ru_maxrss for who in both))"
-        )
-        script = tmp_path / f"run{count}.py"
-        script.write_text(code)
-        out = subprocess.run([sys.executable, script], check=True, capture_output=True, text=True).stdout
-        peaks.append(int(out.splitlines()[-1]))
+    shots = [make_shot(tmp_path / str(count), count) for count in (50, 500)]
+    peaks = [peak(tmp_path, shot.parent.name, [["composite", str(shot), "--jobs", str(jobs)]]) for shot in shots]
     assert peaks[1] <= 1.1 * peaks[0], peaks
+
+
+@pytest.mark.parametrize("command", ["align", "lift", "secondary", "animate"])
+def test_shots_of_two_thousand_frames_take_little_more_memory_than_short_ones(tmp_path, command):
+    """What grows is numbers: a picture of 480 x 270 takes 0.5 MB, and 2,000 of them would take 1,000."""
+    peaks = []
+    for count in (100, 2000):
+        folder = tmp_path / str(count)
+        shot = write_shot(folder, count, (480, 270), '["scarves"]')
+        words = [str(shot)]
+        if command == "animate":
+            words = [str(folder / "drawings/dancer.0001.png"), "--joints", str(folder / "annotation.json")]
+            words += ["--clip", str(folder / "clip.bvh"), "-o", str(folder / "a.gif")]
+        peaks.append(peak(tmp_path, f"{command}{count}", [[command, *words]]))
+    assert peaks[1] <= peaks[0] + 350, peaks

@@ -49,6 +49,12 @@ class Alignment:
         return tuple(PerspectiveCamera(matrix, self.image_size) for matrix in self.matrices)
 
     @property
+    def figure_height(self) -> float:
+        """How tall the drawn figure is in pixels: the median over drawings, from its highest marker to its lowest."""
+        rows = self.markers[..., 1]
+        return float(np.median(np.nanmax(rows, axis=1) - np.nanmin(rows, axis=1)))
+
+    @property
     def depths(self) -> NDArray[np.float64]:
         """Planar depths (F, N) of the drawing's markers in metres."""
         depths: NDArray[np.float64] = (

@@ -226,17 +226,19 @@ class AlignStage:
             warp,
             warp_picture(retiming.cost, retiming.warp, clip_offset=offset, clip_step=step, title=choice.path.name),
         )
+        # Of a long shot only the sheet's pictures are kept.
+        chosen = set(np.linspace(0, len(overlays) - 1, min(_SHEET, len(overlays))).round().astype(int).tolist())
         pictures = []
         for frame, (number, path) in enumerate(zip(self.numbers, overlays, strict=True)):
             label = f"drawing {number}  clip frame {alignment.times[frame]:.1f}  {alignment.errors[frame]:.1f} px"
             picture = read_picture(self.shot.drawings.path(number))
-            pictures.append(align_overlay(picture, alignment, frame, label))
-            write_image(path, pictures[-1])
+            overlay = align_overlay(picture, alignment, frame, label)
+            write_image(path, overlay)
+            if frame in chosen:
+                pictures.append(over_paper(overlay))
             if progress is not None:
                 progress(frame + 1, len(self.numbers))
-        chosen = np.unique(np.linspace(0, len(pictures) - 1, min(_SHEET, len(pictures))).round().astype(int))
-        small = contact_sheet([over_paper(pictures[index]) for index in chosen], columns=4, width=480)
-        write_image(sheet, small)
+        write_image(sheet, contact_sheet(pictures, columns=4, width=480))
 
 
 def _error_table(numbers: list[int], alignment: Alignment) -> str:

@@ -152,8 +152,7 @@ def _camera(shot: Shot) -> Iterator[Problem]:
             shot, "align", f"{values} is out of date: marks, clip, settings or their place have changed", "pegbar align"
         )
         return
-    heights = np.nanmax(alignment.markers[..., 1], axis=1) - np.nanmin(alignment.markers[..., 1], axis=1)
-    height, usual = float(np.median(heights)), float(np.median(alignment.errors))
+    height, usual = alignment.figure_height, float(np.median(alignment.errors))
     for warning in alignment.warnings:
         yield _at(shot, "clip", warning, "another clip, or another part of it: pegbar match")
     for number, apart in zip(stage.numbers, alignment.errors.tolist(), strict=True):

@@ -91,8 +91,7 @@ class DrivingStage:
         if not self.is_aligned:
             return None, False
         alignment, made = AlignStage(self.bare, self.overwrite).run(progress)
-        heights = np.nanmax(alignment.markers[..., 1], axis=1) - np.nanmin(alignment.markers[..., 1], axis=1)
-        height, usual = float(np.median(heights)), float(np.median(alignment.errors))
+        height, usual = alignment.figure_height, float(np.median(alignment.errors))
         worst = int(np.argmax(alignment.errors))
         if usual > self.section.misfit * height:
             raise DegenerateError(

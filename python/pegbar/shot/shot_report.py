@@ -69,9 +69,8 @@ def _aligned(stage: AlignStage) -> list[Section]:
         return []
     alignment = read_alignment(values)
     stale = () if stage.is_done() else ("Out of date: marks, clip or settings have changed. Run pegbar align.",)
-    heights = np.nanmax(alignment.markers[..., 1], axis=1) - np.nanmin(alignment.markers[..., 1], axis=1)
     numbers = stage.numbers if len(stage.numbers) == len(alignment.errors) else range(len(alignment.errors))
-    plot = error_plot(list(numbers), alignment.errors, float(np.median(heights)))
+    plot = error_plot(list(numbers), alignment.errors, alignment.figure_height)
     pictures = [
         _picture(path, caption) for path, caption in ((sheet, "overlays"), (warp, "time warp")) if path.is_file()
     ]
@@ -80,19 +79,19 @@ def _aligned(stage: AlignStage) -> list[Section]:
             "Alignment",
             words=alignment.notes,
             warnings=(*stale, *alignment.warnings),
-            table=tuple(_alignment_rows(alignment, float(np.median(heights)))),
+            table=tuple(_alignment_rows(alignment)),
             pictures=(*pictures, Picture(_embedded(plot), "how far the clip is from the marks", wide=True)),
         )
     ]
 
 
-def _alignment_rows(alignment: Alignment, height: float) -> list[tuple[str, str]]:
+def _alignment_rows(alignment: Alignment) -> list[tuple[str, str]]:
     camera, usual = alignment.cameras[0], float(np.median(alignment.errors))
     return [
         ("clip", alignment.clip_path),
         ("camera", f"{alignment.mode}, {math.degrees(camera.field_of_view):.0f} degrees wide"),
         ("the clip's root", alignment.root.replace("_", " ")),
-        ("clip to marks, median", f"{usual:.1f} px, {usual / height:.1%} of the figure's height"),
+        ("clip to marks, median", f"{usual:.1f} px, {usual / alignment.figure_height:.1%} of the figure's height"),
         ("clip to marks, worst drawing", f"{alignment.errors.max():.1f} px"),
         ("hidden joints guessed", f"{int(alignment.estimated.sum())} of {alignment.estimated.size}"),
         ("feet put on the ground", f"{int(alignment.grounded.sum())}"),
