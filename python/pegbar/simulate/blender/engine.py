@@ -195,4 +195,7 @@ def store(scene: SimulationScene, element: Element, result: Arrays, cache: Cache
 
 
 def _count(element: Element) -> int:
-    return len(element.centers) if isinstance(element, Balls | Boxes) else len(element.vertices)
+    if isinstance(element, Balls | Boxes):
+        return len(element.centers)
+    assert isinstance(element, Cloth | Prop)
+    return len(element.vertices)
