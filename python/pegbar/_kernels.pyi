@@ -43,6 +43,7 @@ __all__ = [
     "segment_stick_figure",
     "step_cloth",
     "step_particles",
+    "step_strands",
     "stroke_polyline",
     "time_warp",
     "unpremultiply",
@@ -191,6 +192,14 @@ def step_particles(
     air: tuple[_Place, _Doubles, float],
     state: tuple[_Doubles, NDArray[np.int64]],
 ) -> _Doubles: ...
+def step_strands(
+    made: tuple[_Doubles, _Indices, _Indices],
+    acting: tuple[tuple[float, tuple[float, float, float]], tuple[float, float, float, float, float], int],
+    air: _Doubles,
+    pins: tuple[_Indices, _Doubles],
+    capsules: _Doubles,
+    state: tuple[_Doubles, _Doubles],
+) -> None: ...
 def fit_triangles(shapes: _Doubles, intermediate: _Doubles, triangles: NDArray[np.uint32]) -> _Doubles: ...
 def average_triangles(fitted: _Doubles, triangles: NDArray[np.uint32], count: int) -> _Doubles: ...
 

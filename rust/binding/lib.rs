@@ -27,6 +27,7 @@ mod rim;
 mod search;
 mod segment;
 mod signs;
+mod strand;
 mod textured;
 mod triangulate;
 mod warp;
@@ -89,6 +90,8 @@ mod _kernels {
     use crate::segment::segment_stick_figure;
     #[pymodule_export]
     use crate::signs::{length_costs, limb_depths};
+    #[pymodule_export]
+    use crate::strand::step_strands;
     #[pymodule_export]
     use crate::textured::render_sheet;
     #[pymodule_export]

@@ -9,15 +9,19 @@ use glam::DVec3;
 
 /// A vertex that touched something in this substep: the normal there and how far that surface moved.
 #[derive(Clone, Copy)]
-struct Touch {
-    normal: DVec3,
-    shift: DVec3,
+pub struct Touch {
+    /// Unit vector away from the surface.
+    pub normal: DVec3,
+    /// Metres in this substep.
+    pub shift: DVec3,
 }
 
 /// A capsule with the way its ends have come in this substep.
 pub struct Volume {
-    capsule: Capsule,
-    shifts: [DVec3; 2],
+    /// Where it is after the substep.
+    pub capsule: Capsule,
+    /// Of its start and its end, metres.
+    pub shifts: [DVec3; 2],
 }
 
 impl Volume {
@@ -172,7 +176,7 @@ fn slack(anchor: (u32, f64), volume: &Volume, forces: &Forces<'_>, positions: &[
 }
 
 /// Takes back the way along the surface that friction does not allow, at most `limit` metres of it.
-fn rub(place: DVec3, before: DVec3, touch: Touch, limit: f64) -> DVec3 {
+pub fn rub(place: DVec3, before: DVec3, touch: Touch, limit: f64) -> DVec3 {
     let way = place - before - touch.shift;
     let along = way - way.dot(touch.normal) * touch.normal;
     let length = along.length();

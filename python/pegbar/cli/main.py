@@ -93,6 +93,16 @@ contact sheet and a report.
 Example: pegbar secondary demo/shot.toml
 
 Example: pegbar secondary demo/shot.toml --frames 1-4""",
+    "effects": """List the effects: what each preset of secondary motion makes, and its settings.
+
+With a name all settings of that one, with their defaults. With --gallery a picture of each, on the sample shot or on
+your own.
+
+Example: pegbar effects
+
+Example: pegbar effects pompoms
+
+Example: pegbar effects balloon --gallery demo/effects --shot demo/shot.toml""",
     "export": """Write an aligned shot for other 3D packages.
 
 Camera, joints in 3D, limbs and ground as USD, glTF, npz and JSON, and a script that sets up Blender to render passes

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -93,6 +93,14 @@ class ElementsStage(Stage):
         if exr:
             write_exr(exr[0], view.channels(), window=view.window)
         return notes
+
+    def picture(self, frame: int) -> NDArray[np.uint8]:
+        """Return the finished ``frame`` (H, W, 3|4) uint8 without writing anything."""
+        output = self.shot.settings.output.model_copy(update={"frames": "frame.####.png"})
+        planned = replace(
+            self, shot=replace(self.shot, settings=self.shot.settings.model_copy(update={"output": output}))
+        )
+        return np.asarray(planned._composite(frame, planned.render(frame).whole())[0], np.uint8)
 
     def render(self, frame: int) -> View:
         """Return what is seen of the elements in ``frame`` and of their and the characters' shadows."""

@@ -30,18 +30,19 @@ from pegbar.shot.secondary import Secondary
 from pegbar.shot.simulation_stage import SimulationStage
 from pegbar.simulate.blender.engine import BlenderEngine
 from pegbar.simulate.cloth import ClothEngine
-from pegbar.simulate.elements import Cloth
+from pegbar.simulate.elements import Cloth, Strands
 from pegbar.simulate.engine import Engine
-from pegbar.simulate.measures import measure_cloth, measure_particles
+from pegbar.simulate.measures import ClothMeasures, measure_cloth, measure_particles, measure_strands
 from pegbar.simulate.particles import ParticleEngine
 from pegbar.simulate.rapier import RapierEngine
 from pegbar.simulate.scene import SimulationScene
+from pegbar.simulate.strands import StrandEngine
 from pegbar.simulate.weather import Particles
 
 Progress = Callable[[str, int, int], None]
 _SHEET = 12
-# Balls first, so that cloth can meet them.
-ENGINES = (RapierEngine(), ClothEngine(), ParticleEngine())
+# Balls first, so that cloth, strands and particles can meet them.
+ENGINES = (RapierEngine(), ClothEngine(), StrandEngine(), ParticleEngine())
 
 
 @dataclass(eq=False)
@@ -189,34 +190,40 @@ def _reprojection(driving: Driving) -> float:
 
 
 def _measured(scene: SimulationScene, cache: DiskCache, first: int) -> dict[str, Any]:
-    """Deepest penetration, with its film frame and limb, and stretch of every cloth, and of all together."""
-    cloths: dict[str, Any] = {}
+    """Deepest penetration, with its film frame and limb, and stretch of all cloth and strands, and of all cloth."""
+    found: dict[str, dict[str, Any]] = {"cloth": {}, "strands": {}}
     stretches = [np.empty(0)]
     for element in scene.elements:
         if isinstance(element, Cloth):
-            found = measure_cloth(scene, cache, element.name)
-            worst = int(np.argmax(found.penetration))
-            middle, most, largest = found.percentiles
-            stretches.append(found.stretch.ravel())
-            cloths[element.name] = {
-                "vertices": len(element.vertices),
-                "deepest_penetration_m": float(found.penetration[worst]),
-                "in_frame": first + worst,
-                "in_limb": found.limb[worst],
-                "stretch_median": middle,
-                "stretch_p99": most,
-                "stretch_max": largest,
-            }
-    particles = _measured_particles(scene, cache, first)
+            measures = measure_cloth(scene, cache, element.name)
+            stretches.append(measures.stretch.ravel())
+            found["cloth"][element.name] = {"vertices": len(element.vertices), **_worst(measures, first)}
+        elif isinstance(element, Strands):
+            measures = measure_strands(scene, cache, element.name)
+            size = {"strands": len(element.counts), "points": len(element.points)}
+            found["strands"][element.name] = size | _worst(measures, first)
+    found["particles"] = _measured_particles(scene, cache, first)
     every = np.concatenate(stretches)
+    parts = [part for kind in found.values() for part in kind.values()]
     return {
-        "cloth": cloths,
-        "particles": particles,
-        "deepest_penetration_m": max(
-            (found["deepest_penetration_m"] for found in (*cloths.values(), *particles.values())), default=None
-        ),
+        **found,
+        "deepest_penetration_m": max((part["deepest_penetration_m"] for part in parts), default=None),
         "height_m": max((character.height for character in scene.characters), default=0.0),
         "stretch_p99": float(np.percentile(every, 99)) if every.size else None,
+    }
+
+
+def _worst(measures: ClothMeasures, first: int) -> dict[str, Any]:
+    """The figures of one element; ``first`` is the film frame of the scene's first."""
+    worst = int(np.argmax(measures.penetration))
+    middle, most, largest = measures.percentiles
+    return {
+        "deepest_penetration_m": float(measures.penetration[worst]),
+        "in_frame": first + worst,
+        "in_limb": measures.limb[worst],
+        "stretch_median": middle,
+        "stretch_p99": most,
+        "stretch_max": largest,
     }
 
 

@@ -1,42 +1,22 @@
-"""Elements of a simulation: cloth with its pins, balls, boxes and props held in a hand."""
+"""Elements of a simulation: cloth and strands with their pins, balls, boxes and props held in a hand."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from pegbar import arrays
-from pegbar.simulate.materials import ClothMaterial, Look, RigidMaterial
+from pegbar.simulate.chains import Bobs as Bobs
+from pegbar.simulate.chains import Strands as Strands
+from pegbar.simulate.materials import ClothMaterial, Look, RigidMaterial, positive
+from pegbar.simulate.pins import Pin as Pin
+from pegbar.simulate.pins import check_pins
 from pegbar.simulate.weather import Particles
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
-PIN_KINDS = ("marker", "limb", "world")
-
-
-@dataclass(frozen=True, eq=False)
-class Pin:
-    """Holds vertices where something is.
-
-    ``kind`` "marker" keeps them at their distance from the marker ``target``, "limb" at their place on the limb
-    ``target`` (which turns, grows and thickens), "world" where they are. ``vertices`` (p,) are the indices held, None
-    all of them; ``character`` names whose marker or limb it is (None: the scene's first).
-    """
-
-    kind: str
-    target: str = ""
-    vertices: Integers | None = None
-    character: str | None = None
-
-    def __post_init__(self) -> None:
-        if self.kind not in PIN_KINDS:
-            raise ValueError(f"kind: want one of {', '.join(PIN_KINDS)}, got {self.kind!r}")
-        if self.kind != "world" and not self.target:
-            raise ValueError(f"target: a pin to a {self.kind} wants its name")
-        if self.vertices is not None:
-            object.__setattr__(self, "vertices", arrays.integers("vertices", self.vertices, ("p",), low=0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,9 +66,7 @@ class Cloth:
         _set(self, "rest", rest)
         if self.coordinates is not None:
             _set(self, "coordinates", arrays.floats("coordinates", self.coordinates, (len(vertices), 2)))
-        for pin in self.pins:
-            if pin.vertices is not None and pin.vertices.size and pin.vertices.max() > last:
-                raise ValueError(f"pins: {self.name}: vertex {pin.vertices.max()} is not one of {last + 1}")
+        check_pins(self.name, self.pins, len(vertices))
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +87,7 @@ class Balls:
 
     def __post_init__(self) -> None:
         _set_rigid(self)
-        _set(self, "radii", _positive("radii", self.radii, (len(self.centers),)))
+        _set(self, "radii", positive("radii", self.radii, (len(self.centers),)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +108,7 @@ class Boxes:
 
     def __post_init__(self) -> None:
         _set_rigid(self)
-        _set(self, "sizes", _positive("sizes", self.sizes, self.centers.shape))
+        _set(self, "sizes", positive("sizes", self.sizes, self.centers.shape))
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +133,7 @@ class Prop:
         _set(self, "capsules", arrays.floats("capsules", self.capsules, ("c", 8)))
 
 
-Element = Cloth | Balls | Boxes | Prop | Particles
+Element = Cloth | Strands | Balls | Boxes | Prop | Particles
 
 
 def _set_rigid(bodies: Balls | Boxes) -> None:
@@ -170,10 +148,3 @@ def _set_rigid(bodies: Balls | Boxes) -> None:
 
 def _set(value: object, name: str, field_value: object) -> None:
     object.__setattr__(value, name, field_value)
-
-
-def _positive(name: str, value: ArrayLike, shape: arrays.Shape) -> Floats:
-    values: Floats = arrays.floats(name, value, shape)
-    if values.size and values.min() <= 0:
-        raise ValueError(f"{name}: want numbers above zero, got {values.min()}")
-    return values

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pegbar import arrays
 
@@ -67,6 +67,28 @@ class ClothMaterial:
 
     def __post_init__(self) -> None:
         check(self, positive=("density", "thickness"), not_negative=("stretch", "bend", "friction", "damping", "drag"))
+
+
+@dataclass(frozen=True)
+class StrandMaterial:
+    """What strands are made of.
+
+    ``density`` is in kg per cubic metre (cotton and hemp 600 to 1400), ``bend`` the bending stiffness E I in newton
+    metre squared (a cotton string 1e-6, a rope of 1 cm 1e-3; 0: none), ``stretch`` the share of its length by which a
+    strand grows under a pull of 10 N, ``friction`` acts on volumes and ground, ``damping`` is the share of motion
+    against its surroundings that is lost in a second, ``drag`` how strongly air holds it (0 none, 1 a round bar and a
+    ball).
+    """
+
+    density: float = 800.0
+    bend: float = 0.0
+    stretch: float = 0.0
+    friction: float = 0.3
+    damping: float = 0.3
+    drag: float = 1.0
+
+    def __post_init__(self) -> None:
+        check(self, positive=("density",), not_negative=("bend", "stretch", "friction", "damping", "drag"))
 
 
 @dataclass(frozen=True)
@@ -134,3 +156,11 @@ def check(value: Any, *, positive: tuple[str, ...] = (), not_negative: tuple[str
             raise ValueError(f"{name}: want a finite number of zero or more, got {number!r}")
         if name in positive and number == 0:
             raise ValueError(f"{name}: want a number above zero, got {number!r}")
+
+
+def positive(name: str, value: ArrayLike, shape: arrays.Shape) -> NDArray[np.float64]:
+    """Return ``value`` as float64 of ``shape``, all above zero; ValueError names the argument."""
+    values: NDArray[np.float64] = arrays.floats(name, value, shape)
+    if values.size and values.min() <= 0:
+        raise ValueError(f"{name}: want numbers above zero, got {values.min()}")
+    return values

@@ -1,15 +1,18 @@
-"""How well a simulation went: how deep cloth and particles lie in volumes, and how far cloth has stretched."""
+"""How well a simulation went: how deep cloth, strands and particles lie in volumes, how far the first two stretch."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import dijkstra
 
 from pegbar import _kernels
 from pegbar.simulate.cache import Cache
-from pegbar.simulate.elements import Cloth, Prop
+from pegbar.simulate.elements import Cloth, Pin, Prop, Strands
 from pegbar.simulate.particles import DROPLET, FALLING, FREE, PHASE, SETTLED
 from pegbar.simulate.scene import SimulationScene
 from pegbar.simulate.sheet import cloth_edges
@@ -21,7 +24,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class ClothMeasures:
-    """What is measured on a cloth over F frames.
+    """What is measured on a cloth, or on strands, over F frames.
 
     ``penetration`` (F,) is how deep its deepest free point lies in a volume, in metres, 0 where it is clear: of all
     vertices that no pin holds and the middles of their edges. ``limb`` (F,) names the volume ("" where it is clear).
@@ -58,17 +61,66 @@ def measure_cloth(scene: SimulationScene, cache: Cache, name: str) -> ClothMeasu
     cloth = next((element for element in scene.elements if element.name == name), None)
     if not isinstance(cloth, Cloth):
         raise ValueError(f"name: {name!r} is no cloth of the scene")
-    rows, names = _volumes(scene)
-    edges, free = cloth_edges(cloth.triangles), _free(cloth)
-    moving = edges[free[edges].any(axis=1)]
+    edges = cloth_edges(cloth.triangles)
     rest = cloth.vertices if cloth.rest is None else cloth.rest
     lengths = np.maximum(np.linalg.norm(rest[edges[:, 0]] - rest[edges[:, 1]], axis=1), 1e-12)
+    return _measure(scene, cache, name, edges, lengths, _free(cloth.pins, len(rest)))
+
+
+def measure_strands(scene: SimulationScene, cache: Cache, name: str) -> ClothMeasures:
+    """Measure the strands ``name`` of ``scene`` in all frames of ``cache``: their points and the middles of links.
+
+    ``stretch`` (F, s) is that of every strand as a whole. Next to a pin that lies in a volume, as in a hand, strands
+    lie in it too: only what is deeper than the pin and the way from it explain counts.
+
+    Raises ValueError for an element that is no strands of the scene and KeyError for frames that are not in the cache.
+
+    Examples
+    --------
+    >>> from pegbar.simulate.cache import MemoryCache
+    >>> line = Strands("line", np.array([[0, 1, 0], [0, 0.5, 0], [0, 0, 0]]), np.array([3]), np.array([0.01]))
+    >>> scene, cache = SimulationScene(frame_rate=24, frames=1, elements=(line,)), MemoryCache()
+    >>> cache.write("line", 0, {"positions": 1.1 * line.points})
+    >>> measure_strands(scene, cache, "line").stretch.round(3).tolist()
+    [[0.1]]
+    """
+    strands = next((element for element in scene.elements if element.name == name), None)
+    if not isinstance(strands, Strands):
+        raise ValueError(f"name: {name!r} is no strands of the scene")
+    links = strands.links
+    lengths, free = strands.link_lengths[links[:, 0]], _free(strands.pins, len(strands.points))
+    found = _measure(scene, cache, name, links, lengths, free, _to_pins(links, lengths, free))
+    starts = np.cumsum(strands.counts - 1) - (strands.counts - 1)
+    grown = np.add.reduceat((1 + found.stretch) * lengths, starts, axis=1)
+    return replace(found, stretch=grown / np.add.reduceat(lengths, starts) - 1)
+
+
+def _measure(
+    scene: SimulationScene,
+    cache: Cache,
+    name: str,
+    edges: NDArray[np.int64],
+    lengths: Floats,
+    free: NDArray[np.bool_],
+    way: tuple[NDArray[np.int64], Floats] | None = None,
+) -> ClothMeasures:
+    """Measure points with ``edges`` (E, 2) of ``lengths`` (E,) of which those of ``free`` (n,) are not pinned.
+
+    ``way`` has by point its pin and the metres to it, where these excuse what lies in a volume.
+    """
+    rows, names = _volumes(scene)
+    moving = edges[free[edges].any(axis=1)]
     penetration, limb, stretch = np.zeros(scene.frames), [], np.empty((scene.frames, len(edges)))
     for frame in range(scene.frames):
         positions = np.asarray(cache.read(name, frame)["positions"], np.float64)
         stretch[frame] = np.linalg.norm(positions[edges[:, 0]] - positions[edges[:, 1]], axis=1) / lengths - 1
         points = np.concatenate([positions[free], positions[moving].mean(axis=1)])
-        penetration[frame], deepest = _deepest(points, rows[frame], names)
+        excused: Floats | float = 0.0
+        if way is not None:
+            capsules = np.ascontiguousarray(rows[frame])
+            held = np.maximum(-_kernels.capsule_distances(positions[way[0]], capsules)[0] - way[1], 0)
+            excused = np.concatenate([held[free], held[moving].max(axis=1)])
+        penetration[frame], deepest = _deepest(points, rows[frame], names, excused)
         limb.append(deepest)
     return ClothMeasures(penetration, tuple(limb), stretch)
 
@@ -129,17 +181,28 @@ def _volumes(scene: SimulationScene) -> tuple[Floats, list[str]]:
     return volumes.at(np.arange(scene.frames, dtype=np.float64)), [limbs[index] for index in volumes.known]
 
 
-def _deepest(points: Floats, rows: Floats, names: list[str]) -> tuple[float, str]:
-    """How deep the deepest of ``points`` (n, 3) lies in a volume, and in which."""
+def _deepest(points: Floats, rows: Floats, names: list[str], excused: Floats | float = 0.0) -> tuple[float, str]:
+    """How deep the deepest of ``points`` (n, 3) lies in a volume beyond what is ``excused``, and in which."""
     distance, nearest = _kernels.capsule_distances(points, np.ascontiguousarray(rows))
+    distance = distance + excused
     if not len(distance) or not distance.min() < 0:
         return 0.0, ""
     deepest = int(distance.argmin())
     return float(-distance[deepest]), names[nearest[deepest]]
 
 
-def _free(cloth: Cloth) -> NDArray[np.bool_]:
-    free = np.ones(len(cloth.vertices), bool)
-    for pin in cloth.pins:
+def _free(pins: Sequence[Pin], count: int) -> NDArray[np.bool_]:
+    free = np.ones(count, bool)
+    for pin in pins:
         free[slice(None) if pin.vertices is None else pin.vertices] = False
     return free
+
+
+def _to_pins(links: NDArray[np.int64], lengths: Floats, free: NDArray[np.bool_]) -> tuple[NDArray[np.int64], Floats]:
+    """By point the nearest pinned point along its strand and the metres to it, inf where there is none."""
+    pins = np.flatnonzero(~free)
+    if not len(pins):
+        return np.zeros(len(free), np.int64), np.full(len(free), np.inf)
+    graph = coo_array((lengths, links.T), shape=(len(free), len(free))).tocsr()
+    metres, _, source = dijkstra(graph, directed=False, indices=pins, min_only=True, return_predecessors=True)
+    return np.where(source < 0, 0, source).astype(np.int64), metres

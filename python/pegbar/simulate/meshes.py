@@ -1,4 +1,4 @@
-"""The cache as meshes to render: cloth with patterns, balls, boxes, props, and the characters' volumes."""
+"""The cache as meshes to render: cloth with patterns, strands, balls, boxes, props, and the characters' volumes."""
 
 from __future__ import annotations
 
@@ -8,15 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from pegbar.scene.camera import PerspectiveCamera
 from pegbar.scene.mesh import Mesh, smooth_normals
 from pegbar.simulate.cache import Cache
-from pegbar.simulate.elements import Balls, Boxes, Cloth, Prop
+from pegbar.simulate.elements import Balls, Boxes, Cloth, Prop, Strands
 from pegbar.simulate.finer import Finer, finer_sheet
 from pegbar.simulate.hulls import hull_triangles, hull_vertices, poses
 from pegbar.simulate.particle_meshes import particle_mesh
 from pegbar.simulate.pattern import sheet_colors
 from pegbar.simulate.scene import SimulationScene
 from pegbar.simulate.tracks import Volumes
+from pegbar.simulate.tubes import strand_meshes
 from pegbar.simulate.weather import Particles
 
 Floats = NDArray[np.float64]
@@ -42,26 +44,33 @@ class Models:
     def meshes(self, cache: Cache, frame: int) -> list[Mesh]:
         """Return the elements' meshes in ``frame`` (from 0); object ids count the scene's elements from 1.
 
-        KeyError for a frame that is not in the cache.
+        Strands are as wide as the scene's camera needs to see them without gaps. KeyError for a frame that is not in
+        the cache.
         """
+        camera = self._scene.cameras[frame] if self._scene.cameras else None
         found: list[Mesh] = []
         for element in self._scene.elements:
             state = cache.read(element.name, frame)
             if isinstance(element, Particles):
-                camera = self._scene.cameras[frame] if self._scene.cameras else None
                 number = self._scene.object_id(element.name)
                 found.append(particle_mesh(element, state, camera, self._scene.frame_rate, number))
                 continue
             positions = np.asarray(state["positions"], np.float64)
-            found += self._of(element, positions, state.get("rotations"))
+            found += self._of(element, positions, state.get("rotations"), camera)
         return found
 
     def _of(
-        self, element: Cloth | Balls | Boxes | Prop, positions: Floats, rotations: NDArray[np.float64] | None
+        self,
+        element: Cloth | Strands | Balls | Boxes | Prop,
+        positions: Floats,
+        rotations: NDArray[np.float64] | None,
+        camera: PerspectiveCamera | None,
     ) -> list[Mesh]:
         number = self._scene.object_id(element.name)
         if isinstance(element, Cloth):
             return self._sheets[element.name].meshes(positions, number)
+        if isinstance(element, Strands):
+            return strand_meshes(element, positions, number, camera)
         if isinstance(element, Balls | Boxes):
             turns = np.tile([0.0, 0, 0, 1], (len(positions), 1)) if rotations is None else rotations
             return [_bodies(element, positions, np.asarray(turns, np.float64), number)]

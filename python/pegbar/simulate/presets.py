@@ -10,13 +10,14 @@ from typing import Any
 from pegbar.scene.camera import PerspectiveCamera
 from pegbar.simulate.elements import Element
 from pegbar.simulate.falling import Rain, Snow
+from pegbar.simulate.holding import Balloon, PomPoms, Rope, Tuft
 from pegbar.simulate.scene import Character
 from pegbar.simulate.standing import Clothesline, FloorBalls
 from pegbar.simulate.wearing import Scarves, Skirt
 
-Preset = Scarves | Skirt | Clothesline | FloorBalls | Snow | Rain
-#: Presets that fill what the cameras see.
-SEEN = (Snow, Rain)
+Preset = Scarves | Skirt | Clothesline | FloorBalls | Snow | Rain | Rope | Balloon | PomPoms | Tuft
+#: Presets that ask what the cameras see.
+SEEN = (Clothesline, Snow, Rain)
 PRESETS: Mapping[str, type[Preset]] = {
     "scarves": Scarves,
     "skirt": Skirt,
@@ -24,6 +25,10 @@ PRESETS: Mapping[str, type[Preset]] = {
     "balls": FloorBalls,
     "snow": Snow,
     "rain": Rain,
+    "balloon": Balloon,
+    "pompoms": PomPoms,
+    "rope": Rope,
+    "strands": Tuft,
 }
 
 
@@ -42,7 +47,7 @@ def preset_elements(
     Parameters
     ----------
     kind : str
-        One of ``PRESETS``.
+        One of ``PRESETS``: "scarves", "skirt", "balloon" and so on.
     character : Character
         Whose sizes are taken and who wears what is worn.
     name : str, optional

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pegbar import arrays
 from pegbar.scene.camera import PerspectiveCamera
 from pegbar.scene.volumes import TaperedCylinders
-from pegbar.simulate.elements import Cloth, Element, Pin, Prop
+from pegbar.simulate.elements import Cloth, Element, Pin, Prop, Strands
 from pegbar.simulate.materials import Wind
 from pegbar.simulate.weather import Particles
 
@@ -103,7 +103,7 @@ class SimulationScene:
         Frames a second.
     frames : int
         Number of frames.
-    elements : tuple of Cloth, Balls, Boxes, Prop or Particles
+    elements : tuple of Cloth, Strands, Balls, Boxes, Prop or Particles
         Their places count from 1 as object ids in the passes, those of particles from 65281.
     characters : tuple of Character
         Each with ``frames`` frames.
@@ -187,7 +187,7 @@ class SimulationScene:
 
 def pins_of(element: Element) -> tuple[Pin, ...]:
     """Return what holds ``element``."""
-    if isinstance(element, Cloth):
+    if isinstance(element, Cloth | Strands):
         return element.pins
     return (element.pin,) if isinstance(element, Prop) else ()
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pegbar import _kernels
+from pegbar.scene.camera import PerspectiveCamera
 from pegbar.simulate.elements import Balls, Cloth, Element, Pin, Prop
 from pegbar.simulate.figure import body_height, capsules_of, marker
 from pegbar.simulate.materials import Color, Look, RigidMaterial, check
@@ -24,6 +26,10 @@ BALL_COLORS = (
     (0.35, 0.05, 0.55, 1.0),
     (0.90, 0.22, 0.02, 1.0),
 )
+#: Cosine between line and view from which on a line is seen too much from its end.
+ENDWISE = 0.8
+#: How far, in body heights, a hand must reach to brush a line behind the character.
+REACH = 0.12
 LAUNDRY = ((0.85, 0.85, 0.80, 1.0), (0.10, 0.35, 0.65, 1.0), (0.80, 0.20, 0.20, 1.0), (0.90, 0.70, 0.15, 1.0))
 
 
@@ -97,9 +103,11 @@ class FloorBalls:
 class Clothesline(Fabric):
     """A line with washing on it, which the character walks by and brushes with a hand.
 
-    ``count`` pieces of ``size`` (width, drop) in body heights hang at ``height``; the line is parallel to the way that
-    the character goes and ``distance`` to its ``side`` ("left" or "right" of the way, for a character on the spot of
-    where it faces), in body heights; None: where the hand on that side reaches.
+    ``count`` pieces of ``size`` (width, drop) in body heights hang at ``height``. The line is parallel to the way that
+    the character goes; for one on the spot, and one that comes towards the camera, it hangs across the picture.
+    ``side`` is "left" or "right" of the way, or of one that goes to the right in the picture: so "left" is behind the
+    character there. None: behind it where a hand reaches there, else before it. ``distance`` is in body heights; None:
+    where a hand on that side reaches.
     """
 
     pattern: str = "plain"
@@ -109,19 +117,27 @@ class Clothesline(Fabric):
     size: tuple[float, float] = (0.3, 0.4)
     gap: float = 0.05
     height: float = 0.85
-    side: str = "left"
+    side: str | None = None
     distance: float | None = None
     fineness: int = 16
     colors: tuple[Color, ...] = LAUNDRY
 
-    def build(self, name: str, character: Character, ground: float | None, seed: int) -> tuple[Element, ...]:
-        """Hang the pieces and the line."""
+    def build(
+        self,
+        name: str,
+        character: Character,
+        ground: float | None,
+        seed: int,
+        cameras: Sequence[PerspectiveCamera] = (),
+    ) -> tuple[Element, ...]:
+        """Hang the pieces and the line so that the first of ``cameras`` sees them."""
         check(self, positive=("height",), not_negative=("gap",))
-        if self.side not in ("left", "right"):
+        if self.side not in ("left", "right", None):
             raise ValueError(f"side: want left or right, got {self.side!r}")
         if not 1 <= self.count <= 50 or not 2 <= self.fineness <= 128:
             raise ValueError(f"count: want 1 to 50 pieces of 2 to 128 threads, got {self.count} of {self.fineness}")
-        tall, (center, along, out) = body_height(character), _way(character, self.side)
+        tall = body_height(character)
+        center, along, out = self._way(character, tall, cameras)
         floor = float(center[1]) if ground is None else ground
         away = self._distance(character, center, out) if self.distance is None else self.distance * tall
         middle = np.array([center[0], floor + self.height * tall, center[2]]) + away * out
@@ -134,8 +150,28 @@ class Clothesline(Fabric):
         reach = (self.count / 2 * step + gap) * along
         return (_line(name, middle - reach, middle + reach, 0.004 * tall), *pieces)
 
+    def _way(
+        self, character: Character, tall: float, cameras: Sequence[PerspectiveCamera]
+    ) -> tuple[Floats, Floats, Floats]:
+        """The middle of the way, the level direction of the line, and the level direction from the one to the other."""
+        pelvis = marker(character, "pelvis")
+        center = (pelvis.min(axis=0) + pelvis.max(axis=0)) / 2
+        walked = pelvis[-1] - pelvis[0]
+        goes = np.hypot(walked[0], walked[2]) >= 0.5
+        along = _level(walked) if goes else _level(marker(character, "left_hip")[0] - marker(character, "right_hip")[0])
+        if cameras:
+            # The third row of a camera's matrix looks into the picture.
+            seen_from = _level(-cameras[0].matrix[2, :3])
+            if not goes or abs(along @ seen_from) > ENDWISE:
+                along = np.cross((0.0, 1.0, 0.0), seen_from)
+        left = np.cross((0.0, 1.0, 0.0), along)
+        side = self.side
+        if side is None:
+            side = "left" if self._distance(character, center, left) >= REACH * tall else "right"
+        return center, along, left if side == "left" else -left
+
     def _distance(self, character: Character, center: Floats, out: Floats) -> float:
-        """How far the hand on the line's side reaches out, less a little, so that it brushes the washing."""
+        """How far a hand reaches out to the line's side, less a little, so that it brushes the washing."""
         ways = [(marker(character, f"{side}_hand") - center) @ out for side in ("left", "right")]
         return float(0.9 * np.max(ways))
 
@@ -150,17 +186,11 @@ class Clothesline(Fabric):
         return Cloth(name, vertices.reshape(-1, 3), sheet, (pin,), none, None, coordinates, None, self.material(), look)
 
 
-def _way(character: Character, side: str) -> tuple[Floats, Floats, Floats]:
-    """The middle of the way, its level direction, and the level direction to its ``side``."""
-    pelvis = marker(character, "pelvis")
-    hips = marker(character, "left_hip")[0] - marker(character, "right_hip")[0]
-    way = pelvis[-1] - pelvis[0]
-    if np.hypot(way[0], way[2]) < 0.5:
-        way = np.cross(hips, (0.0, 1.0, 0.0))
-    along = np.array([way[0], 0.0, way[2]])
-    along /= max(float(np.linalg.norm(along)), 1e-9)
-    left = np.cross((0.0, 1.0, 0.0), along)
-    return (pelvis.min(axis=0) + pelvis.max(axis=0)) / 2, along, left if side == "left" else -left
+def _level(vector: Floats) -> Floats:
+    """The unit vector of what is level in ``vector`` (3,); along X where nothing is."""
+    flat = np.array([vector[0], 0.0, vector[2]])
+    size = float(np.linalg.norm(flat))
+    return np.asarray(flat / size) if size > 1e-9 else np.array([1.0, 0.0, 0.0])
 
 
 def _line(name: str, start: Floats, end: Floats, radius: float) -> Prop:
