@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
 
 from pegbar.errors import MissingFrameError
 from pegbar.io.annotations import read_annotations
+from pegbar.io.exposure import Exposure
+from pegbar.io.exposure_sheet import read_exposure_sheet
 from pegbar.io.frames import read_picture
 from pegbar.io.numbers import format_frames
 from pegbar.io.sequence import FrameSequence, find_sequences
@@ -34,11 +37,11 @@ _EXAMPLES = {
 }
 
 
-def start_shot(folder: Path, drawings: str | None = None) -> str:
+def start_shot(folder: Path, drawings: str | None = None, exposure: Path | None = None) -> str:
     """Return the text of a shot file for the drawn frames in ``folder`` and the folders below it.
 
-    ``drawings`` names their sequence where it cannot be told. Raises MissingFrameError where there is no picture
-    sequence, and ValueError where several could be the drawings.
+    ``drawings`` names their sequence where it cannot be told, ``exposure`` is an exposure sheet. Raises
+    MissingFrameError where there is no picture sequence, and ValueError where several could be the drawings.
     """
     folder = folder.absolute()
     annotations = _annotations(folder)
@@ -57,7 +60,8 @@ def start_shot(folder: Path, drawings: str | None = None) -> str:
     if len(found["drawings"]) > 1:
         names = ", ".join(_relative(sequence, folder) for sequence in found["drawings"])
         raise ValueError(f"{folder}: several sequences could be the drawings: {names}; choose with --drawings")
-    return _text(folder, found["drawings"][0], found, annotations)
+    text = _text(folder, found["drawings"][0], found, annotations)
+    return text if exposure is None else _with_sheet(text, folder, exposure, found["drawings"][0])
 
 
 def _annotations(folder: Path) -> Path | None:
@@ -175,6 +179,22 @@ def _colors(sequence: FrameSequence) -> Iterator[tuple[str, str]]:
             if color not in known:
                 known.add(color)
                 yield f"#{bytes(color).hex()}", f"at x {x}, y {y} in {path.name}"
+
+
+def _with_sheet(text: str, folder: Path, exposure: Path, drawings: FrameSequence) -> str:
+    """The shot file with the sheet in it, and with the sheet's frames; FormatError for one that cannot be read."""
+    sheet = read_exposure_sheet(exposure)
+    name = next(iter(sheet.levels)) if len(sheet.levels) > 1 else None
+    for level in sheet.levels:
+        if drawings.prefix.strip("._-").lower() == level.lower():
+            name = level if len(sheet.levels) > 1 else None
+    path = Path(os.path.relpath(exposure.absolute(), folder)).as_posix()
+    lines = f"exposure = {_quoted(path)}\n"
+    if name is not None:
+        lines += f"level = {_quoted(name)}   # of {', '.join(sheet.levels)}\n"
+    frames = list(Exposure.of_cells(sheet.level(name), sheet.first_frame).frames)
+    text = re.sub(r'(?m)^frames = ".*"$', f'frames = "{format_frames(frames).replace(" ", "")}"', text, count=1)
+    return re.sub(r"(?m)^# hold = 2 .*\n", lambda _: lines, text)
 
 
 def _line(key: str, values: dict[str, str]) -> str:
