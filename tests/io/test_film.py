@@ -54,6 +54,21 @@ def test_odd_sizes_are_made_even_where_they_must(tmp_path):
     assert decoded(tmp_path / "a.mp4")[0][0].shape[:2] == (46, 62)
 
 
+def test_an_mp4_shows_the_colours_that_it_was_given(tmp_path):
+    patches = np.random.default_rng(3).integers(0, 256, (4, 5, 3)).astype(np.uint8)
+    picture = patches.repeat(32, axis=0).repeat(32, axis=1)[:-1, :-1]
+    write_film(tmp_path / "a.mp4", [picture] * 3, 24)
+    with av.open(str(tmp_path / "a.mp4")) as container:
+        frame = list(container.decode(video=0))[1]
+    # What players go by: BT.601, studio range.
+    assert (frame.colorspace, frame.color_range) == (5, 1)
+    got = frame.to_ndarray(format="rgb24")
+    assert got.shape == (128, 160, 3)
+    middles = got[16::32, 16::32].astype(int)
+    assert np.abs(middles - patches).max() <= 6
+    assert np.abs(got[127].astype(int) - got[126]).mean() < 2
+
+
 def test_numbered_files(tmp_path):
     write_film(tmp_path / "walk.####.png", frames(), 24)
     assert sorted(path.name for path in tmp_path.iterdir()) == [f"walk.{number:04}.png" for number in range(1, 7)]

@@ -4,17 +4,27 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pegbar import arrays
 from pegbar.errors import MissingExtraError
 from pegbar.io import atomic
+from pegbar.io.ahead import map_ahead
+
+Pixels = NDArray[np.uint8]
+#: What is converted here, by threads ahead of the encoder's, where libswscale would take twice as long: the format, and
+#: FFmpeg's numbers of its colours and their range.
+_PLANAR, _BT601, _STUDIO = "yuv420p", 5, 1
+#: Colour differences of the whole range in the studio's.
+_STUDIO_COLORS = np.rint(128 + (np.arange(256) - 128) * 224 / 255).astype(np.uint8)
 
 
 class Codec(NamedTuple):
@@ -26,10 +36,12 @@ class Codec(NamedTuple):
     options: dict[str, str]
 
 
+#: x264 searches less than "veryfast" does: a third less time for files a sixth larger and 0.9 dB off the same picture.
+_HASTE = "ref=1:subme=1:me=dia:trellis=0:weightp=0"
 #: What is tried for a file's suffix, the best first.
 CODECS: dict[str, tuple[Codec, ...]] = {
     ".mp4": (
-        Codec("libx264", "yuv420p", None, {"crf": "18", "preset": "veryfast"}),
+        Codec("libx264", "yuv420p", None, {"crf": "18", "preset": "veryfast", "x264-params": _HASTE}),
         Codec("libopenh264", "yuv420p", None, {"b": "8000000"}),
         Codec("h264_videotoolbox", "yuv420p", None, {"b": "8000000"}),
         Codec("mpeg4", "yuv420p", None, {"qscale": "3"}),
@@ -121,37 +133,65 @@ def write_video(
 
 
 def _encode(av: Any, container: Any, codec: Codec, frames: Iterable[ArrayLike], frame_rate: float, alpha: bool) -> int:
-    stream, shape, count = None, (0, 0), 0
-    for index, frame in enumerate(frames):
-        picture = arrays.image(f"frames[{index}]", frame)
+    stream, count = None, 0
+    planar = not alpha and codec.pixels == _PLANAR
+    prepared = map_ahead(partial(_prepared, alpha=alpha, planar=planar), _checked(frames))
+    for shape, picture in prepared:
         if stream is None:
-            shape = picture.shape[:2]
             stream = container.add_stream(codec.name, rate=Fraction(frame_rate).limit_denominator(10_000))
             stream.pix_fmt = codec.alpha_pixels if alpha else codec.pixels
             even = 2 if "420" in stream.pix_fmt else 1
             stream.height, stream.width = (-(-side // even) * even for side in shape)
             stream.options = codec.options
             stream.thread_type, stream.thread_count = "AUTO", 0
-        arrays.same_size(f"frames[{index}]", picture, "the first frame", shape)
-        image = av.VideoFrame.from_ndarray(_even(picture, stream, alpha), "rgba" if alpha else "rgb24")
-        container.mux(stream.encode(image))
-        count = index + 1
+            if planar:
+                context = stream.codec_context
+                context.colorspace, context.color_range = _BT601, _STUDIO
+        if not planar:
+            more = (stream.height - shape[0], stream.width - shape[1])
+            picture = np.pad(picture, ((0, more[0]), (0, more[1]), (0, 0)), mode="edge") if any(more) else picture
+        pixels = _PLANAR if planar else "rgba" if alpha else "rgb24"
+        container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, pixels)))
+        count += 1
     if stream is None:
         raise ValueError("frames: want at least one")
     container.mux(stream.encode())
     return count
 
 
-def _even(picture: NDArray[np.uint8], stream: Any, alpha: bool) -> NDArray[np.uint8]:
-    """The picture with the stream's channels and size."""
+def _checked(frames: Iterable[ArrayLike]) -> Iterator[Pixels]:
+    """The pictures, all of the first one's size."""
+    shape: tuple[int, ...] | None = None
+    for index, frame in enumerate(frames):
+        picture = arrays.image(f"frames[{index}]", frame)
+        shape = shape or picture.shape[:2]
+        arrays.same_size(f"frames[{index}]", picture, "the first frame", shape)
+        yield picture
+
+
+def _prepared(picture: Pixels, *, alpha: bool, planar: bool) -> tuple[tuple[int, int], Pixels]:
+    """A picture's height and width, and its pixels with the stream's channels or as planes."""
+    height, width = picture.shape[:2]
     if picture.shape[2] == 3 and alpha:
-        picture = np.dstack([picture, np.full(picture.shape[:2], 255, np.uint8)])
+        picture = np.dstack([picture, np.full((height, width), 255, np.uint8)])
     elif picture.shape[2] == 4 and not alpha:
         picture = picture[..., :3]
-    more = (stream.height - picture.shape[0], stream.width - picture.shape[1])
-    if any(more):
-        picture = np.pad(picture, ((0, more[0]), (0, more[1]), (0, 0)), mode="edge")
-    return np.ascontiguousarray(picture)
+    picture = np.ascontiguousarray(picture)
+    return (height, width), _planes(picture) if planar else picture
+
+
+def _planes(picture: Pixels) -> Pixels:
+    """A picture (H, W, 3) as planes in an array's rows, luma and, half as large, both colours; sides made even."""
+    height, width = (side + side % 2 for side in picture.shape[:2])
+    if picture.shape[:2] != (height, width):
+        more = [(0, height - picture.shape[0]), (0, width - picture.shape[1]), (0, 0)]
+        picture = np.ascontiguousarray(np.pad(picture, more, mode="edge"))
+    planes = np.asarray(cv2.cvtColor(picture, cv2.COLOR_RGB2YUV_I420), np.uint8)
+    # OpenCV takes the colour of one pixel in four, which frays coloured outlines.
+    half = cv2.resize(picture, (width // 2, height // 2), interpolation=cv2.INTER_AREA)
+    _, red, blue = cv2.split(cv2.LUT(cv2.cvtColor(half, cv2.COLOR_RGB2YCrCb), _STUDIO_COLORS))
+    planes[height:].reshape(2, *blue.shape)[:] = blue, red
+    return planes
 
 
 def _library() -> Any:
