@@ -88,7 +88,10 @@ def piece_ranks(pieces: Pieces, bones: Ints, camera: PerspectiveCamera, poses: F
     relation = np.zeros((len(poses), count, count), np.int8)
     strength = np.where(front, 1, -1) * (1 + touching)
     relation[:, first, second], relation[:, second, first] = strength, -strength
-    return np.stack([_ranks(frame) for frame in relation]) if len(poses) else np.zeros((0, count), np.int64)
+    ranks = np.zeros((len(poses), count), np.int64)
+    for frame, related in enumerate(relation):
+        ranks[frame] = _ranks(related, ranks[max(frame - 1, 0)])
+    return ranks
 
 
 def settle(behind: Floats, cover: Flags, margin: float, drawn: Flags) -> Flags:
@@ -181,11 +184,12 @@ def _drawn_in_front(pieces: Pieces, bones: Ints) -> Flags:
     return score[:, None] > score[None, :]
 
 
-def _ranks(relation: NDArray[np.int8]) -> Ints:
+def _ranks(relation: NDArray[np.int8], before: Ints) -> Ints:
     """Places (P,), 0 the farthest, from who is in front: ``relation[i, j]`` > 0 where i is in front of j, 2 surely.
 
     The farthest of what is left is what is in front of nothing that is surely before it; where there is a circle, what
-    is in front of the fewest.
+    is in front of the fewest. Of several it is what was farthest ``before`` (P,), in the last frame: circles would be
+    broken elsewhere as soon as something changes that covers none of them.
     """
     count = len(relation)
     ranks, left = np.empty(count, np.int64), np.ones(count, bool)
@@ -193,7 +197,7 @@ def _ranks(relation: NDArray[np.int8]) -> Ints:
     over, loosely = sure.sum(axis=1), weak.sum(axis=1)
     for place in range(count):
         candidates = np.flatnonzero(left)
-        lowest = candidates[np.lexsort((candidates, loosely[candidates], over[candidates]))[0]]
+        lowest = candidates[np.lexsort((candidates, loosely[candidates], before[candidates], over[candidates]))[0]]
         ranks[lowest], left[lowest] = place, False
         over, loosely = over - sure[:, lowest], loosely - weak[:, lowest]
     return ranks
