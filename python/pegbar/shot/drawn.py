@@ -28,7 +28,8 @@ SLIT = 96
 class Drawn:
     """A drawn frame: ``color`` (H, W, 3|4) uint8 straight, ``alpha`` and ``depth`` (H, W) float32, and what to note.
 
-    ``limbs`` are those that its labels show, as labels; None where there are no labels.
+    ``limbs`` are those that its labels show, as labels; None where there are no labels. ``labels`` (H, W) are the
+    limbs of all that is drawn.
     """
 
     color: NDArray[np.uint8]
@@ -36,6 +37,7 @@ class Drawn:
     depth: NDArray[np.float32]
     notes: tuple[str, ...] = ()
     limbs: frozenset[int] | None = None
+    labels: NDArray[np.uint8] | None = None
 
 
 def drawn_inputs(shot: Shot, frame: int) -> list[Path]:
@@ -81,7 +83,7 @@ def read_drawn(shot: Shot, frame: int) -> Drawn:
     grown = grow_labels(labels, layer.alpha > 0, reach=settings.reach)
     ends, end_depths = limb_ends(shot, frame, grown)
     depth = limb_depth(grown, ends, end_depths, interpolation=settings.interpolation)
-    return Drawn(layer.color, layer.alpha, depth, notes, limbs)
+    return Drawn(layer.color, layer.alpha, depth, notes, limbs, grown)
 
 
 def limb_ends(shot: Shot, frame: int, labels: NDArray[np.uint8]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -23,6 +23,8 @@ OUTPUT_SUFFIXES: dict[str, tuple[str, ...]] = {
     "depth": (".exr",),
     "depth_picture": (".png",),
     "holdout": (".png", ".tif", ".tiff"),
+    "visible": (".png", ".tif", ".tiff"),
+    "layers": (".exr",),
 }
 
 

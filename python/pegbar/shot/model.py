@@ -21,12 +21,8 @@ def parse_color(text: str) -> tuple[int, int, int]:
     return red, green, blue
 
 
-def _check_color(text: str) -> str:
-    parse_color(text)
-    return text.lower()
-
-
-Color = Annotated[str, AfterValidator(_check_color)]
+# A colour is a triple, which is never empty.
+Color = Annotated[str, AfterValidator(lambda text: parse_color(text) and text.lower())]
 Coordinate = Annotated[float, Field(allow_inf_nan=False)]
 
 
@@ -264,6 +260,8 @@ class OutputSection(Section):
     depth: str = "depth/depth.####.exr"
     depth_picture: str | None = "depth/depth.####.png"
     holdout: str | None = None
+    visible: str | None = None
+    layers: str | None = None
     space: Literal["auto", "display", "linear"] = "auto"
 
     @model_validator(mode="after")

@@ -32,7 +32,7 @@ from pegbar.shot.load import key_lines, load_shot
 from pegbar.shot.marks import read_marks
 from pegbar.shot.model import ShotFile, parse_color
 
-OUTPUTS = ("frames", "depth", "depth_picture", "holdout")
+OUTPUTS = ("frames", "depth", "depth_picture", "holdout", "visible", "layers")
 
 
 @dataclass(frozen=True, eq=False)

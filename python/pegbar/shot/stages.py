@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 from pegbar.io.atomic import clean_leftovers
 from pegbar.io.exr import read_passes, write_exr
 from pegbar.io.frames import read_image, write_image
-from pegbar.layer.composite import Space, depth_composite, holdout_matte
+from pegbar.layer.composite import Space, depth_composite, holdout_matte, visible_matte
 from pegbar.layer.rim import rim_depth
 from pegbar.report.contact_sheet import over_paper
 from pegbar.report.depth_picture import depth_picture
 from pegbar.shot.drawn import Drawn, drawn_inputs, read_drawn
+from pegbar.shot.drawn_layers import drawn_layers
 from pegbar.shot.plan import Shot
 from pegbar.shot.record import fingerprint, forget, is_up_to_date, write_record
 
@@ -101,10 +102,10 @@ class Stage:
 
 
 class DepthStage(Stage):
-    """Depth of the drawing (eq. of section 3.3.1): an EXR map in metres, and a picture to look at."""
+    """Depth of the drawing (eq. of section 3.3.1): an EXR map in metres, a picture to look at, and layers for Nuke."""
 
     def outputs(self, frame: int) -> list[Path]:
-        return [path for key in ("depth", "depth_picture") if (path := self.shot.output(key, frame))]
+        return [path for key in ("depth", "depth_picture", "layers") if (path := self.shot.output(key, frame))]
 
     def inputs(self, frame: int) -> list[Path]:
         return drawn_inputs(self.shot, frame)
@@ -114,10 +115,14 @@ class DepthStage(Stage):
 
     def make(self, frame: int) -> tuple[str, ...]:
         drawn = read_drawn(self.shot, frame)
-        depth, *picture = self.outputs(frame)
-        write_exr(depth, {"Z": drawn.depth})
-        if picture:
-            write_image(picture[0], depth_picture(drawn.depth, *self._range(drawn)))
+        depth, picture, layers = (self.shot.output(key, frame) for key in ("depth", "depth_picture", "layers"))
+        if depth is not None:
+            write_exr(depth, {"Z": drawn.depth})
+        if picture is not None:
+            write_image(picture, depth_picture(drawn.depth, *self._range(drawn)))
+        if layers is not None:
+            marks = self.shot.annotations
+            write_exr(layers, drawn_layers(drawn, [limb.name for limb in marks.limbs] if marks is not None else []))
         return drawn.notes
 
     def _range(self, drawn: Drawn) -> tuple[float, float]:
@@ -129,10 +134,10 @@ class DepthStage(Stage):
 
 
 class CompositeStage(Stage):
-    """The drawing and the rendered passes in depth order (eqs. 16-17), and the matte that holds the render out."""
+    """The drawing and the rendered passes in depth order (eqs. 16-17), and the mattes that do it elsewhere."""
 
     def outputs(self, frame: int) -> list[Path]:
-        return [path for key in ("frames", "holdout") if (path := self.shot.output(key, frame))]
+        return [path for key in ("frames", "holdout", "visible") if (path := self.shot.output(key, frame))]
 
     def inputs(self, frame: int) -> list[Path]:
         assert self.shot.beauty is not None
@@ -151,7 +156,8 @@ class CompositeStage(Stage):
         check_passes(frame, self.inputs(frame)[-1], drawn.alpha.shape, beauty, depth)
         depth = rim_depth(beauty, depth)
         target = self.shot.settings.output.composite_space
-        final, *holdout = self.outputs(frame)
+        final, holdout, visible = (self.shot.output(key, frame) for key in ("frames", "holdout", "visible"))
+        assert final is not None
         picture = depth_composite(
             drawn.color,
             drawn.alpha,
@@ -163,9 +169,11 @@ class CompositeStage(Stage):
             dtype=np.float32 if self.shot.settings.output.is_exr else np.uint8,
         )
         write_final(final, picture)
-        if holdout:
-            kept = holdout_matte(drawn.alpha, drawn.depth, depth)
-            write_image(holdout[0], np.rint(kept * 255).astype(np.uint8)[..., None])
+        if holdout is not None:
+            _write_matte(holdout, holdout_matte(drawn.alpha, drawn.depth, depth))
+        if visible is not None:
+            coverage = np.asarray(beauty[..., 3], np.float32) / (255 if beauty.dtype == np.uint8 else 1)
+            _write_matte(visible, visible_matte(drawn.alpha, drawn.depth, np.clip(coverage, 0, 1), depth))
         return drawn.notes
 
     def read_rendered(self, frame: int) -> tuple[NDArray[Any], NDArray[np.float32], Space]:
@@ -201,6 +209,10 @@ def check_passes(frame: int, path: Path, drawn: tuple[int, ...], beauty: NDArray
             f"frame {frame}: {path}: beauty {got[1]} x {got[0]} and depth {depth.shape[1]} x {depth.shape[0]} pixels: "
             f"both must be the same whole number of times the drawing's {width} x {height}"
         )
+
+
+def _write_matte(path: Path, matte: NDArray[np.float32]) -> None:
+    write_image(path, np.rint(matte * 255).astype(np.uint8)[..., None])
 
 
 def write_final(path: Path, picture: NDArray[Any]) -> None:
