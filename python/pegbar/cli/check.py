@@ -34,12 +34,13 @@ def check(
     from pegbar.shot.preflight import preflight
 
     problems, read = preflight(shot, BatchOptions(frames=frames, jobs=jobs).select, jobs, progress)
+    wrong = sum(not problem.note for problem in problems)
     if as_json:
         print(json.dumps({"frames_read": read, "problems": [problem.record() for problem in problems]}, indent=1))
     else:
         _print(problems)
-        print(f"check: {read} frames read, {len(problems) or 'no'} problem{'' if len(problems) == 1 else 's'}")
-    return 1 if problems else 0
+        print(f"check: {read} frames read, {wrong or 'no'} problem{'' if wrong == 1 else 's'}")
+    return 1 if wrong else 0
 
 
 def _print(problems: list[Problem]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -148,9 +149,9 @@ def _camera(shot: Shot) -> Iterator[Problem]:
         yield _at(shot, "align.output", describe(error), "pegbar align --overwrite")
         return
     if not stage.is_done():
-        yield _at(
-            shot, "align", f"{values} is out of date: marks, clip, settings or their place have changed", "pegbar align"
-        )
+        # Stages that need it align again by themselves.
+        what = f"{values} is out of date: marks, clip, settings or their place have changed"
+        yield replace(_at(shot, "align", what, "pegbar align"), note=True)
         return
     height, usual = alignment.figure_height, float(np.median(alignment.errors))
     for warning in alignment.warnings:

@@ -40,13 +40,17 @@ _MENDS = (
 
 @dataclass(frozen=True)
 class Problem:
-    """What is wrong; ``place`` is file and line, as far as they are known, ``frames`` are the film frames with it."""
+    """What is wrong; ``place`` is file and line, as far as they are known, ``frames`` are the film frames with it.
+
+    A ``note`` is good to know, and nothing to mend before work goes on.
+    """
 
     what: str
     mend: str = ""
     key: str = ""
     place: str = ""
     frames: tuple[int, ...] = ()
+    note: bool = False
 
     @property
     def where(self) -> str:
@@ -64,7 +68,7 @@ class Problem:
         """The problem as values that JSON holds."""
         file, _, line = self.place.rpartition(":") if re.search(r":\d+$", self.place) else (self.place, "", "")
         values = {"what": self.what, "mend": self.mend, "key": self.key, "file": file}
-        return {**values, "line": int(line) if line else None, "frames": list(self.frames)}
+        return {**values, "line": int(line) if line else None, "frames": list(self.frames), "note": self.note}
 
 
 def mend(what: str) -> str:
