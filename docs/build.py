@@ -41,14 +41,22 @@ def write_reference(folder: Path, rooms: dict[str, list[tuple[str, str]]]) -> No
 
 
 def indented(text: str) -> str:
-    """Return Markdown with what belongs to a list item four columns in, as Python-Markdown wants it."""
-    lines, inside = [], 0
+    """Return Markdown with lists as Python-Markdown wants them: what belongs to an item four columns in, and a blank
+    line before a list and after an item of several paragraphs.
+    """
+    lines: list[str] = []
+    inside, parted, fenced = 0, False, False
     for line in text.splitlines():
-        if item := re.match(r"(-|\*|\d+\.) +", line):
-            inside = item.end()
+        fenced ^= line.startswith("```")
+        item = None if fenced else re.match(r"(-|\*|\d+\.) +", line)
+        if item:
+            if lines and lines[-1].strip() and (parted or not inside):
+                lines.append("")
+            inside, parted = item.end(), False
         elif line and not line.startswith(" "):
             inside = 0
         elif inside and line.startswith(" " * inside):
+            parted = parted or not lines[-1].strip()
             line = " " * (4 - inside) + line
         lines.append(line)
     return "\n".join(lines) + "\n"

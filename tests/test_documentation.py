@@ -87,6 +87,9 @@ def test_the_reference_has_every_public_name(tmp_path):
 
 
 def test_lists_are_indented_as_the_site_wants_them():
-    text = "1. One\n   more\n\n   ```sh\n   ls\n   ```\n2. Two\n\nText\n   far\n- a\n  b\n"
-    wanted = "1. One\n    more\n\n    ```sh\n    ls\n    ```\n2. Two\n\nText\n   far\n- a\n    b\n"
+    text = (
+        "1. One\n   more\n\n   ```sh\n   ls\n   ```\n2. Two\n3. Three\n\nText\n   far\n- a\n  b\n\n```text\n- c\n```\n"
+    )
+    steps, rest = "1. One\n    more\n\n    ```sh\n    ls\n    ```\n\n2. Two\n3. Three\n", "Text\n   far\n\n- a\n    b\n"
+    wanted = f"{steps}\n{rest}\n```text\n- c\n```\n"
     assert builder().indented(text) == wanted

@@ -257,6 +257,44 @@ def test_a_full_disk_is_told(tmp_path, capsys, monkeypatch):
     assert "GB left" in capsys.readouterr().err
 
 
+def test_init_finds_dots_and_says_where_each_colour_is(tmp_path, capsys):
+    for name in ("dots", "labels", "drawings", "holdout"):
+        (tmp_path / name).mkdir()
+    paper = np.full((40, 60, 3), 255, np.uint8)
+    dots = {1: {(255, 0, 0): (10, 20)}, 2: {(255, 0, 0): (12, 20), (0, 128, 0): (30, 8)}}
+    for number, places in dots.items():
+        write_image(tmp_path / f"drawings/d.{number:04d}.png", paper)
+        write_image(tmp_path / f"holdout/d.{number:04d}.png", paper)
+        layer, labels = np.zeros((40, 60, 4), np.uint8), np.zeros((40, 60, 3), np.uint8)
+        for color, (x, y) in places.items():
+            layer[y - 2 : y + 3, x - 2 : x + 3] = (*color, 255)
+        labels[5:15, 20:31] = (0, 0, 255)
+        # Ink that was left in the layer, and a rim.
+        layer[30:34, 40:50], layer[17, 9:12] = (60, 50, 40, 255), (255, 0, 0, 90)
+        write_image(tmp_path / f"dots/d.{number:04d}.png", layer)
+        write_image(tmp_path / f"labels/d.{number:04d}.png", labels)
+    assert run("init", tmp_path) == 0
+    shot = tmp_path / "shot.toml"
+    lines = shot.read_text().splitlines()
+    colors = [line for line in lines if re.match(r'# ("#|\? = )', line) and " at x " in line]
+    assert [line[:14] for line in colors] == ['# "#ff0000" = ', '# "#008000" = ', '# ? = "#0000ff']
+    assert [line.rpartition("# ")[2] for line in colors] == [
+        "at x 10, y 20 in d.0001.png",
+        "at x 30, y 8 in d.0002.png",
+        "at x 25, y 9 in d.0001.png",
+    ]
+    # Filled in as the file says, it is read.
+    text = shot.read_text().replace('# "#ff0000" = "?"', '"#ff0000" = "left_hand"')
+    text = text.replace('# "#008000" = "?"', '"#008000" = "left_elbow"').replace("# ? = ", "left_forearm = ")
+    shot.write_text(text)
+    assert run("dots", shot) == 0
+    drawing = read_annotations(tmp_path / "marks.json")
+    assert drawing.names == ("left_hand", "left_elbow")
+    np.testing.assert_allclose(drawing.markers[1], [[12, 20], [30, 8]], atol=0.5)
+    assert drawing.limbs[0].color == (0, 0, 255)
+    assert "holdout" not in text.partition("[output]")[0]
+
+
 def change_marks(folder, **changes):
     write_annotations(folder / "marks.json", dataclasses.replace(read_annotations(folder / "marks.json"), **changes))
 

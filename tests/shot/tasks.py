@@ -63,3 +63,10 @@ class Fragile:
                     continue
             os.kill(os.getpid(), signal.SIGKILL)
         return frame
+
+
+class Blocked:
+    """The signals that are held back in the worker."""
+
+    def __call__(self, frame):
+        return signal.pthread_sigmask(signal.SIG_BLOCK, ())

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from pegbar.shot.batch import run_frames
-from tests.shot.tasks import Die, Fragile, Slow, Square, Threads
+from tests.shot.tasks import Blocked, Die, Fragile, Slow, Square, Threads
 
 
 @pytest.mark.parametrize("jobs", [1, 3])
@@ -114,6 +114,14 @@ def test_a_worker_that_is_killed_while_it_answers_fails_its_frame_only():
     results = {r.frame: r for r in run_frames(Fragile(), [1, 2, 3, 4], jobs=2)}
     assert "worker process ended" in results[2].error
     assert [results[f].value for f in (1, 3, 4)] == [1, 3, 4]
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="no signal masks here")
+def test_workers_begin_with_ctrl_c_held_back_and_the_parent_keeps_it():
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, ())
+    masks = [r.value for r in run_frames(Blocked(), [1, 2, 3], jobs=2)]
+    assert all(signal.SIGINT in mask for mask in masks)
+    assert signal.pthread_sigmask(signal.SIG_BLOCK, ()) == before
 
 
 def assert_gone(processes, seconds=5.0):

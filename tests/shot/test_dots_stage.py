@@ -106,6 +106,6 @@ def test_a_colour_of_a_limb_that_is_none_is_named(tmp_path, capsys):
     shot.write_text(text + 'limbs = { left_forearm = "#ff8000", left_wing = "#00ff00" }\n')
     assert main(["dots", str(shot)]) == 2
     told = capsys.readouterr().err
-    assert "dots.limbs: no limb left_wing between the joints" in told
+    assert "dots.limbs: no limb left_wing between joints that have dots" in told
     assert "left_forearm" in told
     assert not (tmp_path / "marks.json").exists()

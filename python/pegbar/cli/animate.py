@@ -222,7 +222,7 @@ def _perform(
             if not keep_going:
                 break
         else:
-            _report(outcome)
+            _report(outcome, f"{target.name}: " if len(jobs) > 1 else "")
     return 1 if failed else 0
 
 
@@ -273,9 +273,9 @@ def _bar(name: str) -> Iterator[Advance | None]:
         yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
-def _report(outcome: Outcome) -> None:
+def _report(outcome: Outcome, name: str) -> None:
     for note in outcome.notes:
-        print(f"pegbar: warning: {note}", file=sys.stderr)
+        print(f"pegbar: warning: {name}{note}", file=sys.stderr)
     pace = outcome.frames / max(outcome.seconds - outcome.setup, 1e-9)
     print(
         f"animate: {outcome.output}: {outcome.frames} pictures, {outcome.setup:.1f} s to the first, "

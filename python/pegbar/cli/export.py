@@ -11,7 +11,7 @@ from cyclopts import Parameter
 
 from pegbar.cli.secondary import bars
 
-_ALL = "usd,gltf,npz,blender"
+_ALL = "usd,gltf,npz,blender,exposure"
 
 
 def export(

@@ -14,7 +14,10 @@ from pegbar.cli.batch import BatchOptions, progress
 from pegbar.cli.secondary import bars
 
 if TYPE_CHECKING:
+    from pegbar.io.sequence import FrameSequence
+    from pegbar.shot.import_stage import ImportStage
     from pegbar.shot.incoming import Finding
+    from pegbar.shot.passes_check import ImportOptions, Judgement
 
 
 def import_passes(
@@ -45,36 +48,51 @@ def import_passes(
         EXR sequences, like render/beauty.####.exr: colour and depth in one, or one of each.
     """
     from pegbar.layer.depth_convention import UNITS
-    from pegbar.shot.import_stage import ImportStage
-    from pegbar.shot.incoming import Incoming
     from pegbar.shot.passes_check import ImportOptions
-    from pegbar.shot.passes_section import write_passes
-    from pegbar.shot.plan import open_shot
-    from pegbar.shot.shot_scene import Tracked, shot_scene
 
     if not passes:
         raise ValueError("want the passes to import, like render/beauty.####.exr")
     if unit is not None and unit not in UNITS:
         raise ValueError(f"--unit: want one of {', '.join(UNITS)}, got {unit}")
-    incoming = Incoming.find(passes, shift, layer)
-    wanted = BatchOptions(frames=frames).select(open_shot(shot, aligned=False).frames)
-    beside = shot.absolute().parent
-    with bars() as tell:
-        scene, _ = shot_scene(Tracked(shot, False, beside / "export"), tell)
     options = ImportOptions(depth, UNITS[unit] if unit else None, alpha)
-    stage = ImportStage(incoming, tuple(wanted), scene, output or beside / "imported", options)
+    stage = _stage(shot, passes, (shift, layer), frames, output, options)
     target = stage.outputs
     found, judgement = stage.check()
     print_table(found)
     if judgement is None:
         print("pegbar: the passes cannot be used as they are; nothing is written", file=sys.stderr)
         return 1
-    if check:
-        return 0
-    with progress("import", len(wanted)) as advance:
+    return 0 if check else _take(shot, stage, judgement, target)
+
+
+def _stage(
+    shot: Path,
+    passes: Sequence[str],
+    found: tuple[int, str | None],
+    frames: str | None,
+    output: Path | None,
+    options: ImportOptions,
+) -> ImportStage:
+    from pegbar.shot.import_stage import ImportStage
+    from pegbar.shot.incoming import Incoming
+    from pegbar.shot.plan import open_shot
+    from pegbar.shot.shot_scene import Tracked, shot_scene
+
+    incoming = Incoming.find(passes, *found)
+    wanted = BatchOptions(frames=frames).select(open_shot(shot, aligned=False).frames)
+    beside = shot.absolute().parent
+    with bars() as tell:
+        scene, _ = shot_scene(Tracked(shot, False, beside / "export"), tell)
+    return ImportStage(incoming, tuple(wanted), scene, output or beside / "imported", options)
+
+
+def _take(shot: Path, stage: ImportStage, judgement: Judgement, target: FrameSequence) -> int:
+    from pegbar.shot.passes_section import write_passes
+
+    with progress("import", len(stage.frames)) as advance:
         stage.run(judgement, advance)
     section = write_passes(shot, Path(target.pattern))
-    print(f"import-passes: {len(wanted)} frames written, {os.path.relpath(target.pattern)}")
+    print(f"import-passes: {len(stage.frames)} frames written, {os.path.relpath(target.pattern)}")
     print(f"import-passes: {os.path.relpath(shot)} says now: {section.splitlines()[1]}")
     return 0
 

@@ -6,7 +6,7 @@ import errno
 import os
 import platform
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from pegbar.errors import PegbarError
@@ -55,20 +55,26 @@ def hold(folder: Path) -> Iterator[None]:
         opened = os.open(place, os.O_RDWR | os.O_CREAT, 0o666)
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(folder)) from None
-    with open(opened, "r+", encoding="utf-8") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            who = file.read(200).strip() or "another process"
-            raise BusyError(f"{folder}: another pegbar is at work here ({who}): wait until it is done") from None
-        except OSError as error:
-            if error.errno not in _WITHOUT:
-                raise
-        file.truncate(0)
-        file.write(f"process {os.getpid()} on {platform.node()}")
-        file.flush()
+    try:
+        _lock(opened, folder)
         _held.add(place)
-        try:
-            yield
-        finally:
-            _held.discard(place)
+        yield
+    finally:
+        _held.discard(place)
+        os.close(opened)
+
+
+def _lock(opened: int, folder: Path) -> None:
+    """Lock the open file and write into it who holds it."""
+    try:
+        fcntl.flock(opened, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        who = os.read(opened, 200).decode(errors="replace") or "another process"
+        raise BusyError(f"{folder}: another pegbar is at work here ({who}): wait until it is done") from None
+    except OSError as error:
+        if error.errno not in _WITHOUT:
+            raise
+    # Where the disk is full, the name is missing and the lock holds all the same.
+    with suppress(OSError):
+        os.truncate(opened, 0)
+        os.write(opened, f"process {os.getpid()} on {platform.node()}".encode())

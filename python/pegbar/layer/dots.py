@@ -18,21 +18,31 @@ _RIVAL = 0.5
 
 # Fewer pixels of a colour are the rim of a dot, or dirt.
 _SMALLEST = 8
+# Paper, ink and pencil differ less between their channels.
+_VIVID = 100
 
 
-def dot_colors(picture: NDArray[np.uint8]) -> list[tuple[int, int, int]]:
-    """Return the colours of dots in ``picture`` (H, W, 3 or 4) uint8: opaque, saturated, of several pixels; by size.
+def flat_colors(picture: NDArray[np.uint8]) -> dict[tuple[int, int, int], tuple[int, int]]:
+    """Return the flat vivid colours of ``picture`` (H, W, 3 or 4) uint8, largest first, and a pixel (x, y) of each.
 
     >>> picture = np.full((9, 9, 3), 255, np.uint8)
-    >>> picture[2:6, 2:6] = (255, 0, 0)
-    >>> dot_colors(picture)
-    [(255, 0, 0)]
+    >>> picture[2:6, 3:7] = (255, 0, 0)
+    >>> flat_colors(picture)
+    {(255, 0, 0): (4, 3)}
     """
-    pixels = picture[picture[..., 3] == 255] if picture.shape[2] == 4 else picture.reshape(-1, 3)
-    colors, counts = np.unique(pixels[:, :3], axis=0, return_counts=True)
-    vivid = np.ptp(colors.astype(int), axis=1) > 100
-    order = np.argsort(-counts, kind="stable")
-    return [(int(r), int(g), int(b)) for r, g, b in colors[order[(vivid & (counts >= _SMALLEST))[order]]]]
+    opaque = picture[..., 3] == 255 if picture.shape[2] == 4 else np.ones(picture.shape[:2], bool)
+    rows, columns = np.nonzero(opaque)
+    packed = picture[rows, columns, :3].astype(np.int64) @ [65536, 256, 1]
+    values, owner, counts = np.unique(packed, return_inverse=True, return_counts=True)
+    found = {}
+    for index in np.argsort(-counts, kind="stable").tolist():
+        red, green, blue = (int(values[index]) >> shift & 255 for shift in (16, 8, 0))
+        if counts[index] >= _SMALLEST and max(red, green, blue) - min(red, green, blue) > _VIVID:
+            pixels = np.flatnonzero(owner == index)
+            row = rows[pixels[(len(pixels) - 1) // 2]]
+            across = columns[pixels[rows[pixels] == row]]
+            found[red, green, blue] = int(across[(len(across) - 1) // 2]), int(row)
+    return found
 
 
 @dataclass(frozen=True, eq=False)

@@ -129,8 +129,8 @@ class DotsStage:
         limbs = tuple(replace(limb, color=colors.get(limb.name)) for limb in limbs_between(names))
         known = [limb.name for limb in limbs]
         if strange := [name for name in colors if name not in known]:
-            told = f"no limb {', '.join(strange)} between the joints that have dots (there are {', '.join(known)})"
-            raise ShotError([f"{self.path}: dots.limbs: {told}"])
+            told = f"no limb {', '.join(strange)} between joints that have dots: dot both its ends"
+            raise ShotError([f"{self.path}: dots.limbs: {told} (there are {', '.join(known)})"])
         between = [number for number, key in zip(numbers, keyed, strict=True) if not key]
         return Drawing(
             names=names,

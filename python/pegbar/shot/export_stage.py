@@ -18,14 +18,16 @@ from pegbar.export.shot_scene import ShotScene
 from pegbar.export.shot_usd import shot_usd
 from pegbar.export.shot_values import shot_arrays, shot_table
 from pegbar.io import atomic
+from pegbar.io.exposure_sheet import ExposureSheet, csv_text, xdts_text
 
-Format = Literal["usd", "gltf", "npz", "blender"]
+Format = Literal["usd", "gltf", "npz", "blender", "exposure"]
 #: Every format with the files that it writes.
 FILES: dict[Format, tuple[str, ...]] = {
     "usd": ("shot.usdc",),
     "gltf": ("shot.glb",),
     "npz": ("shot.npz", "shot.json"),
     "blender": ("shot.json", "open_in_blender.py"),
+    "exposure": ("exposure.csv", "exposure.xdts"),
 }
 
 
@@ -61,6 +63,8 @@ def write_shot(folder: Path, scene: ShotScene, formats: Sequence[Format]) -> lis
         "shot.glb": lambda: shot_glb(scene),
         "shot.npz": lambda: _npz(scene),
         "shot.json": lambda: json.dumps(shot_table(scene, folder)).encode(),
+        "exposure.csv": lambda: csv_text(_sheet(scene)).encode(),
+        "exposure.xdts": lambda: xdts_text(_sheet(scene), scene.name).encode(),
         "open_in_blender.py": lambda: resources.files("pegbar.export").joinpath("open_in_blender.py").read_bytes(),
     }
     # All is made before anything is written, so that what cannot be made leaves the old files whole and alike.
@@ -82,6 +86,10 @@ def write_shot(folder: Path, scene: ShotScene, formats: Sequence[Format]) -> lis
 def export_notes(scene: ShotScene, formats: Sequence[Format]) -> list[str]:
     """Return what of ``scene`` the formats cannot hold."""
     return gltf_notes(scene) if "gltf" in formats else []
+
+
+def _sheet(scene: ShotScene) -> ExposureSheet:
+    return ExposureSheet({"drawing": scene.drawings}, scene.frames[0])
 
 
 def _npz(scene: ShotScene) -> bytes:

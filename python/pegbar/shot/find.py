@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import TypeVar
 
 from pegbar.errors import describe
+from pegbar.io.exposure import Exposure
+from pegbar.io.exposure_sheet import read_exposure_sheet
 from pegbar.io.frames import PICTURE_SUFFIXES
 from pegbar.io.numbers import format_frames
 from pegbar.io.sequence import FrameSequence
@@ -66,6 +68,20 @@ def find_input(folder: Path, pattern: str | None) -> FrameSequence | None:
     return sequence
 
 
+def find_exposure(drawing: DrawingSection, folder: Path, drawings: FrameSequence) -> Exposure:
+    """Return which drawing every frame shows; ValueError or OSError for a sheet that cannot be read or lacks it."""
+    if drawing.exposure is None:
+        return Exposure.of(drawing.hold, drawings.numbers)
+    sheet = read_exposure_sheet(folder / drawing.exposure)
+    try:
+        cells = sheet.level(drawing.level)
+    except ValueError as error:
+        raise KeyedError(("drawing", "level"), f"{drawing.exposure}: {error}") from None
+    if missing := sorted({cell for cell in cells if cell is not None} - {*drawings.numbers}):
+        raise ValueError(f"{drawing.exposure} shows drawing {format_frames(missing)}: there is no such picture")
+    return Exposure.of_cells(cells, sheet.first_frame)
+
+
 def plan_output(folder: Path, key: str, pattern: str) -> FrameSequence:
     """Return the sequence that output ``key`` is written to; ValueError for a pattern that cannot hold it."""
     suffixes = OUTPUT_SUFFIXES[key]
@@ -102,7 +118,7 @@ def match_marks(annotations: Drawing, drawings: FrameSequence, settings: Drawing
         return by_name
     if settings.first_marked is not None:
         return {settings.first_marked + index: index for index in range(count)}
-    if settings.hold == "sparse" and len(numbers) == count:
+    if (settings.hold == "sparse" or settings.exposure is not None) and len(numbers) == count:
         return {number: index for index, number in enumerate(numbers)}
     if settings.hold != "sparse" and numbers[-1] - numbers[0] + 1 == count:
         return {numbers[0] + index: index for index in range(count)}

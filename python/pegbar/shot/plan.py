@@ -18,7 +18,16 @@ from pegbar.io.sequence import FrameSequence
 from pegbar.layer.matte import Mode
 from pegbar.scene.camera import PerspectiveCamera
 from pegbar.scene.drawing import Drawing
-from pegbar.shot.find import KeyedError, Problems, check_clash, find_input, match_marks, place_of, plan_output
+from pegbar.shot.find import (
+    KeyedError,
+    Problems,
+    check_clash,
+    find_exposure,
+    find_input,
+    match_marks,
+    place_of,
+    plan_output,
+)
 from pegbar.shot.load import key_lines, load_shot
 from pegbar.shot.marks import read_marks
 from pegbar.shot.model import ShotFile, parse_color
@@ -113,7 +122,8 @@ def plan_shot(
     marks: dict[int, int] | None = {}
     exposure = frames = None
     if drawings is not None:
-        exposure = problems.call("drawing.hold", Exposure.of, drawing.hold, drawings.numbers)
+        key = "drawing.exposure" if drawing.exposure else "drawing.hold"
+        exposure = problems.call(key, find_exposure, drawing, folder, drawings)
         frames = problems.call("shot.frames", _frames, settings, exposure, beauty) if exposure else None
         if annotations is not None and not drawing.depth:
             marks = problems.call("drawing.annotations", match_marks, annotations, drawings, drawing)
