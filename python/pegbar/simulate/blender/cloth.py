@@ -21,7 +21,7 @@ PULL = 10.0
 #: Blender's cloth counts time in units of its own, so many seconds whatever the frame rate: it takes gravity times
 #: 0.001 (measured in free fall with 4.5 and 5.0). Forces are times 0.001 for the same reason.
 UNIT = 0.001**0.5
-#: Blender's wind pushes with 0.02 N a square metre and unit of strength (``SIM_mass_spring_force_face_wind``).
+#: Blender's wind pushes with 0.02 of its units a square metre and strength, over the frames a second (measured).
 WIND_PRESSURE = 0.02
 #: Half the density of air in kg/m^3: pressure is this times the squared speed.
 HALF_AIR = 0.6
@@ -91,7 +91,7 @@ def settings_of(cloth: Cloth, substeps: int, frame_rate: float) -> dict[str, flo
         "bending_stiffness": BEND * material.bend * mass,
         "bending_damping": 0.0,
         "air_damping": 100 * UNIT * mass * rate,
-        "time_scale": 1 / frame_rate / UNIT,
+        "time_scale": round(1024 / frame_rate / UNIT) / 1024,
         "pin_stiffness": 1.0,
     }
 
@@ -180,5 +180,6 @@ def wind_of(scene: SimulationScene, cloth: Cloth, middle: Floats) -> Floats:
     if len(waves):
         air += np.sin(places @ waves[:, 3:6].T - times * waves[:, 6] + waves[:, 7]) @ waves[:, :3]
     speed = np.linalg.norm(air, axis=1, keepdims=True)
-    push: Floats = air * speed * HALF_AIR * cloth.material.drag * UNIT**2 / WIND_PRESSURE
+    force = HALF_AIR * cloth.material.drag * UNIT**2 / WIND_PRESSURE
+    push: Floats = air * speed * force * scene.frame_rate
     return push

@@ -41,13 +41,15 @@ class BlenderEngine:
 
     blender: Blender
     rigid_substeps: int = 20
-    cloth_substeps: int = 20
+    cloth_substeps: int = 16
     self_collision: bool = False
     name: str = "blender"
 
     def supports(self, element: Element) -> bool:
-        """Whether ``element`` is cloth, rigid or a prop."""
-        return isinstance(element, Cloth | Balls | Boxes | Prop)
+        """Whether ``element`` is cloth, a prop, or bodies at rest: Blender knows no speed that a body begins with."""
+        if isinstance(element, Balls | Boxes):
+            return not element.velocities.any()
+        return isinstance(element, Cloth | Prop)
 
     def run(
         self, scene: SimulationScene, elements: Sequence[Element], cache: Cache, start: int, progress: Progress | None
@@ -121,7 +123,8 @@ class BlenderEngine:
             arrays |= more
         if cloths:
             arrays["collider"], arrays["collider_triangles"] = colliders(scene, cache)
-        substeps = max(1, round(self.cloth_substeps * 24 / scene.frame_rate))
+        # A power of two: Blender adds up steps until a frame is full, and with any other number one more may fit.
+        substeps = 2 ** max(0, round(np.log2(self.cloth_substeps * 24 / scene.frame_rate)))
         for cloth in cloths:
             entry, more = cloth_entry(scene, cloth, names[cloth.name], substeps, self.self_collision)
             job["cloths"].append(entry)
@@ -164,7 +167,7 @@ def body_entry(element: Balls | Boxes, name: str) -> tuple[dict[str, Any], Array
         "bounce": material.bounce,
         "damping": material.damping,
     }
-    arrays = {"centers": element.centers, "velocities": element.velocities, "sizes": sizes}
+    arrays = {"centers": element.centers, "sizes": sizes}
     return entry, {f"{name}_{what}": array for what, array in arrays.items()}
 
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import bpy
 import numpy as np
-from mathutils import Quaternion
+from mathutils import Quaternion, Vector
 
 #: Half the side of the ground, in metres.
 REACH = 100.0
@@ -54,7 +54,6 @@ def new_scene(job: dict[str, Any]) -> Any:
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.context.preferences.edit.keyframe_new_interpolation_type = "LINEAR"
     scene = bpy.context.scene
-    # Whole frames a second with a divisor, which may be a fraction.
     rate = max(1, round(job["frame_rate"]))
     scene.render.fps, scene.render.fps_base = rate, rate / job["frame_rate"]
     scene.frame_start, scene.frame_end = 1, job["total"]
@@ -86,8 +85,6 @@ def simulate_bodies(job: dict[str, Any], arrays: dict[str, Any], tell: Progress)
             turns = [place[1] for place in places]
             found[name]["rotations"].append([(turn.x, turn.y, turn.z, turn.w) for turn in turns])
         tell.step()
-    for name, state in found.items():
-        state["positions"][0] = arrays[f"{name}_centers"].tolist()
     return {
         name: {what: np.array(rows, np.float64)[job["pre_roll"] :] for what, rows in state.items()}
         for name, state in found.items()
@@ -112,11 +109,10 @@ def add_limb(scene: Any, index: int, arrays: dict[str, Any]) -> None:
 
 
 def add_bodies(scene: Any, bodies: dict[str, Any], arrays: dict[str, Any]) -> list[Any]:
-    """The bodies of one set; one with a speed is carried along for a frame and let go."""
+    """The bodies of one set, at rest."""
     name, made = bodies["name"], []
-    rate = scene.render.fps / scene.render.fps_base
-    rows = zip(*(arrays[f"{name}_{what}"] for what in ("centers", "velocities", "sizes")), strict=True)
-    for index, (center, velocity, size) in enumerate(rows):
+    rows = zip(*(arrays[f"{name}_{what}"] for what in ("centers", "sizes")), strict=True)
+    for index, (center, size) in enumerate(rows):
         built = new_object(scene, f"{name}_{index}", *box(size.tolist()))
         built.location = center.tolist()
         shape = "SPHERE" if bodies["round"] else "BOX"
@@ -125,16 +121,6 @@ def add_bodies(scene: Any, bodies: dict[str, Any], arrays: dict[str, Any]) -> li
         body.mass = max(1e-3, bodies["density"] * volume)
         body.linear_damping = body.angular_damping = min(1.0, bodies["damping"])
         body.use_deactivation = False
-        if np.any(velocity):
-            step = velocity / rate
-            # Its place a frame later, and a place from which it gets there with the speed that it then has.
-            fall = np.array(scene.gravity) / rate**2
-            for frame, place in ((1, center - fall / 2), (2, center + step + fall / 2)):
-                built.location = place.tolist()
-                built.keyframe_insert("location", frame=frame)
-            for frame, held in ((1, True), (2, True), (3, False)):
-                body.kinematic = held
-                body.keyframe_insert("kinematic", frame=frame)
         made.append(built)
     return made
 
@@ -145,8 +131,7 @@ def make_rigid(built: Any, kind: str, shape: str, *, friction: float, bounce: fl
     bpy.ops.rigidbody.object_add(type=kind)
     body = built.rigid_body
     body.collision_shape, body.kinematic = shape, kinematic
-    body.friction, body.restitution = friction, bounce
-    body.use_margin, body.collision_margin = True, 0.001
+    body.friction, body.restitution, body.use_margin, body.collision_margin = friction, bounce, True, 0.001
     return body
 
 
@@ -252,13 +237,9 @@ def set_cloth(built: Any, cloth: dict[str, Any], total: int, settles: bool) -> N
             settings.keyframe_insert("air_damping", frame=frame)
     settings.vertex_group_mass = "pins"
     settings.use_sewing_springs = cloth["sewn"]
-    settings.effector_weights.gravity = 1.0
-    meets.use_collision = True
-    meets.collision_quality = cloth["collision_quality"]
-    meets.distance_min = cloth["thickness"]
-    meets.friction = cloth["friction"]
-    meets.use_self_collision = cloth["self_collision"]
-    meets.self_distance_min = cloth["thickness"]
+    meets.use_collision, meets.collision_quality = True, cloth["collision_quality"]
+    meets.distance_min = meets.self_distance_min = cloth["thickness"]
+    meets.friction, meets.use_self_collision = cloth["friction"], cloth["self_collision"]
     modifier.point_cache.frame_start, modifier.point_cache.frame_end = 1, total
 
 
@@ -282,17 +263,11 @@ def add_wind(scene: Any, wind: Any) -> None:
     for frame, push in enumerate(wind, 1):
         strength = float(np.linalg.norm(push))
         if strength > 0:
-            field.rotation_quaternion = direction(push / strength)
+            # It blows along +Z.
+            field.rotation_quaternion = Vector((0.0, 0.0, 1.0)).rotation_difference(Vector(push.tolist()))
         field.field.strength = strength
         field.keyframe_insert("rotation_quaternion", frame=frame)
         field.field.keyframe_insert("strength", frame=frame)
-
-
-def direction(unit: Any) -> Quaternion:
-    """The rotation that takes +Z, along which wind blows, to ``unit``."""
-    from mathutils import Vector
-
-    return Vector((0.0, 0.0, 1.0)).rotation_difference(Vector(unit.tolist()))
 
 
 def follow(built: Any, path: Path, track: Any) -> None:
