@@ -51,7 +51,7 @@ def test_the_gallery_has_a_picture_of_each(shot, tmp_path, capsys):
         assert main(["effects", name, "--gallery", str(folder), "--shot", str(shot), "--width", "120"]) == 0
     assert "effects: 1 pictures in" in capsys.readouterr().out
     assert sorted(path.name for path in folder.iterdir()) == ["balloon.png", "balls.png"]
-    drawing = over_paper(read_picture(shot.parent / "drawings/dancer.0004.png"))[::2, ::2]
+    drawing = over_paper(read_picture(shot.parent / "drawings/dancer.0003.png"))[::2, ::2]
     for name in ("balloon", "balls"):
         picture = read_image(folder / f"{name}.png")
         assert picture.shape == (68, 120, 3)

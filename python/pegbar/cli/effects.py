@@ -24,7 +24,7 @@ def effects(
     *,
     gallery: Annotated[Path | None, Parameter(help="Folder for a picture of every preset, or of NAME.")] = None,
     shot: Annotated[Path | None, Parameter(help="Shot file for the pictures (default: the sample shot).")] = None,
-    frame: Annotated[int | None, Parameter(help="Frame of the pictures (default: three quarters in).")] = None,
+    frame: Annotated[int | None, Parameter(help="Frame of the pictures (default: the shot's middle).")] = None,
     width: Annotated[int, Parameter(help="Width of the pictures in pixels.")] = 480,
 ) -> int:
     """List the effects; see `pegbar effects --help`."""

@@ -20,8 +20,8 @@ from pegbar.simulate.presets import preset_elements
 from pegbar.simulate.scene import SimulationScene
 
 Picture = NDArray[np.uint8]
-#: Where in the shot a picture is taken when no frame is named: late enough for what piles up, runs or is thrown.
-SHARE = 0.75
+#: Where in the shot a picture is taken when no frame is named.
+SHARE = 0.5
 
 
 def effect_pictures(
@@ -30,7 +30,7 @@ def effect_pictures(
     """Yield by preset a picture (H, ``width``, 3) uint8 of it on the shot file ``shot``, or why there is none.
 
     The shot needs a ``[secondary]`` section; its elements are left out, its air, ground and seed count. ``frame`` is
-    the film frame (None: three quarters into the shot). Raises ShotError for a shot without the section and ValueError
+    the film frame (None: the middle of the shot). Raises ShotError for a shot without the section and ValueError
     for a frame that it has not.
     """
     import cv2
