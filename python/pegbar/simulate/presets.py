@@ -10,11 +10,13 @@ from typing import Any
 from pegbar.scene.camera import PerspectiveCamera
 from pegbar.simulate.elements import Element
 from pegbar.simulate.falling import Rain, Snow
+from pegbar.simulate.holding import Umbrella
+from pegbar.simulate.lying import FootPuddle, LyingSnow, Snowfall
 from pegbar.simulate.scene import Character
 from pegbar.simulate.standing import Clothesline, FloorBalls
 from pegbar.simulate.wearing import Scarves, Skirt
 
-Preset = Scarves | Skirt | Clothesline | FloorBalls | Snow | Rain
+Preset = Scarves | Skirt | Clothesline | FloorBalls | Snow | Rain | Umbrella | LyingSnow | FootPuddle
 #: Presets that fill what the cameras see.
 SEEN = (Snow, Rain)
 PRESETS: Mapping[str, type[Preset]] = {
@@ -22,8 +24,11 @@ PRESETS: Mapping[str, type[Preset]] = {
     "skirt": Skirt,
     "clothesline": Clothesline,
     "balls": FloorBalls,
-    "snow": Snow,
+    "snow": Snowfall,
+    "snow_field": LyingSnow,
     "rain": Rain,
+    "umbrella": Umbrella,
+    "puddle": FootPuddle,
 }
 
 
