@@ -18,6 +18,20 @@ class Row(NamedTuple):
     promise: str = ""
     correctness: str = ""
 
+    @classmethod
+    def left_out(cls, name: str, reason: object) -> Row:
+        """A comparison that could not be made here, and why."""
+        return cls(name, "", "", "", "", f"left out: {reason}")
+
+    @property
+    def line(self) -> str:
+        """The row of a Markdown table."""
+        return "| " + " | ".join(cell.replace("|", "/") for cell in self) + " |"
+
+
+#: What stands above the rows.
+HEADER = "| what | ours | peer | ratio | promised | in the same run |\n|---|---|---|---|---|---|"
+
 
 def alternate(*works: Callable[[], object], rounds: int = 15) -> list[float]:
     """Return the median milliseconds of each of ``works``, taken in turn, so that a noisy machine treats them alike.

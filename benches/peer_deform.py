@@ -23,23 +23,23 @@ DATA = Path(os.environ.get("PEGBAR_TEST_DATA", Path(__file__).parents[2] / "shar
 SIZE = (1920, 1080)
 
 
-def run() -> Iterator[tuple[object, ...]]:
+def run() -> Iterator[Row]:
     """Yield rows for each figure, and for one rendered."""
     for name in ("char1", "char4"):
         path = DATA / f"arap_{name}.npz"
         if path.exists():
             yield from beside_libigl(name, dict(np.load(path)))
         else:
-            yield f"deform {name}", f"left out: no {path}"
+            yield Row.left_out(f"deform {name}", f"no {path}")
     yield from rendering()
 
 
-def beside_libigl(name: str, data: dict[str, NDArray[Any]]) -> Iterator[tuple[object, ...]]:
+def beside_libigl(name: str, data: dict[str, NDArray[Any]]) -> Iterator[Row]:
     """Yield rows: factors, one round and five, beside libigl with the mesh in space (as usual) and in the plane."""
     try:
         import igl
     except ImportError as error:
-        yield f"deform {name}", f"left out: {error}"
+        yield Row.left_out(f"deform {name}", error)
         return
     vertices, triangles, handles = data["vertices"], data["triangles"].astype(np.int64), data["handles"]
     ours = Deformer(vertices, triangles, handles)
@@ -105,7 +105,7 @@ def quality(
     return 100 * float(change), 100 * float((areas(places) * areas(vertices) <= 0).mean())
 
 
-def rendering() -> Iterator[tuple[object, ...]]:
+def rendering() -> Iterator[Row]:
     """Yield rows: a bent sheet of 2,450 triangles, figure-sized and as large as the picture."""
     part = np.linspace(0, 1, 36)
     rest = np.stack(np.meshgrid(part, part), axis=-1).reshape(-1, 2)

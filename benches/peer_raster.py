@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benches.measure import alternate
+from benches.measure import Row, alternate
 from pegbar import Ink, Mesh, Passes, PerspectiveCamera, render_passes
 
 SAMPLES = 2
@@ -61,7 +61,7 @@ void main() {
 """
 
 
-def run() -> Iterator[tuple[object, ...]]:
+def run() -> Iterator[Row]:
     """Yield rows: passes beside fills, growth with the triangles, and llvmpipe."""
     mesh = torus(184, 90)
     yield from beside_fills(mesh)
@@ -92,7 +92,7 @@ def fill(parts: list[NDArray[Any]]) -> None:
         part.fill(1)
 
 
-def beside_fills(mesh: Mesh) -> Iterator[tuple[object, ...]]:
+def beside_fills(mesh: Mesh) -> Iterator[Row]:
     """Yield rows for flat colours, bands, and bands with ink, beside filling fresh and used buffers."""
     used = buffers()
     for name, options in {
@@ -105,7 +105,7 @@ def beside_fills(mesh: Mesh) -> Iterator[tuple[object, ...]]:
             return render_passes([mesh], CAMERA, samples=SAMPLES, **options)
 
         ours, fresh, again = alternate(render, lambda: fill(buffers()), lambda: fill(used))
-        yield (
+        yield Row(
             f"render_passes 33k triangles, {name}",
             f"{ours:.0f} ms",
             f"np.empty and fill {fresh:.0f} ms, fill again {again:.0f} ms",
@@ -115,16 +115,17 @@ def beside_fills(mesh: Mesh) -> Iterator[tuple[object, ...]]:
         )
 
 
-def growth() -> Iterator[tuple[object, ...]]:
+def growth() -> Iterator[Row]:
     """Yield rows for 1k to 1M triangles on the same picture."""
     for rings, sides in ((32, 16), (100, 50), (320, 158), (1000, 500)):
         mesh = torus(rings, sides)
         count = len(mesh.triangles)
         (taken,) = alternate(lambda mesh=mesh: render_passes([mesh], CAMERA, samples=SAMPLES), rounds=5)
-        yield f"render_passes {count} triangles, flat", f"{taken:.0f} ms", f"{count / taken / 1e3:.2f} M triangles/s"
+        pace = f"{count / taken / 1e3:.2f} M triangles/s"
+        yield Row(f"render_passes {count} triangles, flat", f"{taken:.0f} ms, {pace}", "", "")
 
 
-def beside_llvmpipe(mesh: Mesh) -> Iterator[tuple[object, ...]]:
+def beside_llvmpipe(mesh: Mesh) -> Iterator[Row]:
     """Yield one row beside Mesa's software rasteriser, or why there is none."""
     os.environ.setdefault("LP_NUM_THREADS", os.environ.get("RAYON_NUM_THREADS", "1"))
     os.environ.setdefault("GALLIUM_DRIVER", "llvmpipe")
@@ -133,7 +134,7 @@ def beside_llvmpipe(mesh: Mesh) -> Iterator[tuple[object, ...]]:
 
         context = moderngl.create_context(standalone=True, backend="egl")
     except Exception as error:  # moderngl raises bare exceptions for a missing library or driver
-        yield "llvmpipe", f"left out: {error}"
+        yield Row.left_out("llvmpipe", error)
         return
     draw, read = peer(context, mesh)
 
@@ -141,12 +142,13 @@ def beside_llvmpipe(mesh: Mesh) -> Iterator[tuple[object, ...]]:
         return render_passes([mesh], CAMERA, samples=SAMPLES, near=NEAR, light=(0.4, 0.8, 0.45), bands=BANDS)
 
     ours, drawn, both = alternate(render, draw, lambda: (draw(), read()))
-    yield (
+    yield Row(
         "render_passes 33k triangles, bands",
         f"{ours:.0f} ms",
         f"{context.info['GL_RENDERER']}, {os.environ['LP_NUM_THREADS']} thread: drawn {drawn:.0f} ms, "
         f"with reading back {both:.0f} ms",
         f"{drawn / ours:.1f}x and {both / ours:.1f}x",
+        "",
         agreement(render(), read()),
     )
 

@@ -61,6 +61,25 @@ def arm_puppet(distance=3.0, columns=21, rows=5):
     )
 
 
+def handed_puppet(distance=3.0):
+    """`arm_puppet` with shorter bones, 75 px each: what is beyond 200 px is a hand of 50 px."""
+    puppet = arm_puppet(distance)
+    marks = np.array([[50.0, 99.5], [125.0, 99.5], [200.0, 99.5]])
+    on_bones = puppet.vertices[puppet.handles, 0] <= 200
+    handles = puppet.handles[on_bones]
+    along = (puppet.vertices[handles, 0] - 50) / 75
+    places = [int(np.abs(puppet.vertices[handles, 0] - x).argmin()) for x in marks[:, 0]]
+    return puppet.changed(
+        marks=marks,
+        pose=puppet.camera.unproject(marks, np.full(3, distance)),
+        triangle_bone=(puppet.vertices[puppet.triangles][..., 0].mean(axis=1) > 125).astype(np.int64),
+        handles=handles,
+        handle_bone=(along > 1).astype(np.int64),
+        handle_fraction=np.where(along > 1, along - 1, along),
+        joint_handles=np.array(places),
+    )
+
+
 def turned_poses(puppet, degrees, elbow=0.0):
     """The arm's poses (F, 3, 3), turned by `degrees` (F,) about the upright axis towards the camera."""
     angle = np.radians(np.asarray(degrees, float))

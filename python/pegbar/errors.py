@@ -56,8 +56,12 @@ class ShotError(PegbarError, ValueError):
 class MissingExtraError(PegbarError, ImportError):
     """A library that is not installed, since only some users want it; the message says how to install it."""
 
-    def __init__(self, purpose: str, extra: str) -> None:
-        super().__init__(f'{purpose} needs a library that is not installed: pip install "pegbar[{extra}]"')
+    def __init__(self, purpose: str, extra: str, otherwise: str = "") -> None:
+        super().__init__(f'{purpose} needs a library that is not installed: pip install "pegbar[{extra}]"{otherwise}')
+
+
+class BlenderError(PegbarError, ChildProcessError):
+    """Blender cannot be run, or failed; the message ends with the last lines that it wrote."""
 
 
 class SimulationError(PegbarError, RuntimeError):

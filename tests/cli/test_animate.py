@@ -69,6 +69,19 @@ def test_frames_keep_what_is_transparent(folder):
     assert not (folder / ".pegbar").exists()
 
 
+def test_warnings_name_the_figure_or_the_batchs_file(folder, capsys):
+    bert = read_image(folder / "anna.png")
+    bert[100:102, 80:82, 3] = 0
+    write_image(folder / "bert.png", bert)
+    (folder / "bert.json").write_text((folder / "anna.json").read_text().replace("anna.png", "bert.png"))
+    pictures, clip = (str(folder / "anna.png"), str(folder / "bert.png")), str(folder / "clips" / "stand.bvh")
+    for output, name in (("both.gif", "bert"), ("out", "bert_stand.gif")):
+        assert main(["animate", *pictures, "--clip", clip, "--size", "60x80", "-o", str(folder / output)]) == 0
+        told = [line for line in capsys.readouterr().err.splitlines() if "speck" in line]
+        assert len(told) == 1
+        assert told[0].startswith(f"pegbar: warning: {name}: 1 hole")
+
+
 def test_a_batch_does_every_picture_with_every_clip(folder, capsys):
     (folder / "clips" / "broken.bvh").write_text("HIERARCHY\nnothing")
     batch = ["animate", str(folder), "--clip", str(folder / "clips"), "-o", str(folder / "out"), "--size", "60x80"]

@@ -1,11 +1,15 @@
 import random
 import shutil
 import signal
+import subprocess
+import sys
 
 import pytest
 
 from pegbar.cli.main import main
+from pegbar.io.hold import BusyError, hold
 from tests.cli.interruptions import contents, start, wait_for
+from tests.cli.pipeline import kill_and_compare, write_shot
 from tests.shots import make_shot
 
 COUNT = 24
@@ -72,3 +76,68 @@ def test_two_runs_at_once_do_not_harm_each_other(shot, undisturbed):
         process.communicate(timeout=120)
         assert process.returncode == 0
     assert contents(shot.parent / "final") == undisturbed[1]
+
+
+def test_the_whole_batch_killed_and_run_again_gives_the_undisturbed_bytes(tmp_path):
+    write_shot(tmp_path / "shot", 3, (128, 72), '["balls"]')
+    assert kill_and_compare(tmp_path / "shot", 2, random.Random(), ["--jobs", "1"]) == []
+
+
+@pytest.fixture
+def holder():
+    """Starts processes that hold a folder until they are killed."""
+    processes = []
+
+    def start_holder(folder):
+        code = (
+            "import sys, time; from pathlib import Path; from pegbar.io.hold import hold\n"
+            "with hold(Path(sys.argv[1])):\n    print(flush=True); time.sleep(600)"
+        )
+        process = subprocess.Popen([sys.executable, "-c", code, folder], stdout=subprocess.PIPE)
+        processes.append(process)
+        process.stdout.readline()
+        return process
+
+    yield start_holder
+    for process in processes:
+        process.kill()
+        process.communicate()
+
+
+def test_a_second_run_in_a_folder_is_told_who_works_there_until_that_one_is_gone(tmp_path, holder):
+    first = holder(tmp_path / "align")
+    said = f"{tmp_path}/align: another pegbar is at work here .process {first.pid} on"
+    with pytest.raises(BusyError, match=said), hold(tmp_path / "align"):
+        raise AssertionError
+    with hold(tmp_path / "lift"), hold(tmp_path / "lift"):
+        pass
+    first.kill()
+    first.wait()
+    with hold(tmp_path / "align"), pytest.raises(ZeroDivisionError), hold(tmp_path / "other"):
+        raise ZeroDivisionError
+    with hold(tmp_path / "other"):
+        pass
+
+
+def test_a_second_run_of_frames_says_so_and_goes_on(shot, undisturbed, holder, capsys):
+    first = holder(shot.parent / "final")
+    assert main(["composite", str(shot), "--jobs", "1"]) == 0
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1
+    assert f"final: another pegbar is at work here (process {first.pid} on" in lines[0]
+    assert lines[0].endswith("frames may be made twice")
+    assert contents(shot.parent / "final") == undisturbed[1]
+
+
+def test_a_second_run_of_a_stage_says_so_and_stops(tmp_path, holder, capsys):
+    shot = write_shot(tmp_path, 3, (128, 72), '["balls"]')
+    for command, folder in (("align", "align"), ("secondary", "secondary"), ("lift", "align")):
+        first = holder(tmp_path / folder)
+        before = sorted(tmp_path.rglob("*"))
+        assert main([command, str(shot)]) == 2
+        assert f"process {first.pid} on" in capsys.readouterr().err
+        assert {path for path in set(tmp_path.rglob("*")) - set(before) if path.is_file()} <= {
+            tmp_path / "secondary/.pegbar/run.lock"
+        }
+        first.kill()
+        first.wait()

@@ -155,7 +155,7 @@ def test_wrong_use_is_one_line_and_exit_code_2(tmp_path, clips, capsys, words, s
 
 def test_what_cannot_be_written_or_used_is_said_before_the_search(tmp_path, clips, capsys, monkeypatch):
     marks = annotate(tmp_path / "a.json", drawn(dance_clip(), 40, 30, 60))
-    monkeypatch.setattr("pegbar.cli.match.read_clips", lambda *_, **__: pytest.fail("searched"))
+    monkeypatch.setattr("pegbar.io.clip_folder.read_clips", lambda *_, **__: pytest.fail("searched"))
     code, _, err = run(capsys, marks, clips, "--write", tmp_path / "none.toml")
     assert code == 2
     assert "none.toml" in err

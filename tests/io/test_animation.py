@@ -1,4 +1,5 @@
 import struct
+import sys
 
 import cv2
 import numpy as np
@@ -17,9 +18,14 @@ def frames(count=7, channels=4):
         yield picture[..., :channels]
 
 
-@pytest.mark.parametrize("suffix", [".png", ".apng", ".webp"])
+@pytest.mark.parametrize("suffix", [".png", ".apng", ".webp", "without PyAV.webp"])
 @pytest.mark.parametrize("channels", [3, 4])
-def test_every_frame_comes_back_exactly(suffix, channels, tmp_path):
+def test_every_frame_comes_back_exactly(suffix, channels, tmp_path, monkeypatch):
+    if "PyAV" in suffix:
+        monkeypatch.setitem(sys.modules, "av", None)
+        monkeypatch.setattr("pegbar.io.webp.importlib.util.find_spec", lambda name: None)
+    else:
+        pytest.importorskip("av")
     file = tmp_path / f"walk{suffix}"
     write_animation(file, frames(channels=channels), 24)
     good, got = cv2.imreadanimation(str(file))
@@ -46,6 +52,25 @@ def test_an_apng_is_a_png_that_older_programs_show(tmp_path):
     delays = [struct.unpack_from(">HH", data, at + 24) for at in range(len(data)) if data[at : at + 4] == b"fcTL"]
     assert {numerator / denominator for numerator, denominator in delays} == {0.1}
     assert np.array_equal(read_image(file)[..., 3], next(frames())[..., 3])
+
+
+def test_a_webp_holds_what_changes_and_says_its_size(tmp_path):
+    file, wide = tmp_path / "walk.webp", np.zeros((51, 401, 3), np.uint8)
+    other = wide.copy()
+    other[31, 201] = 255
+    write_animation(file, [wide, other, other], 10)
+    data = file.read_bytes()
+    assert struct.unpack_from("<4sI4s", data) == (b"RIFF", len(data) - 8, b"WEBP")
+    assert data[12:16] == b"VP8X"
+    assert data[20] == 0x02
+    assert [int.from_bytes(data[place : place + 3], "little") + 1 for place in (24, 27)] == [401, 51]
+    places = [place + 8 for place in range(len(data)) if data[place : place + 4] == b"ANMF"]
+    found = [[int.from_bytes(data[at : at + 3], "little") for at in range(place, place + 12, 3)] for place in places]
+    # Halves of an even corner, then sides less one: a pixel in an odd place is in a patch of two by two.
+    assert found == [[0, 0, 400, 50], [100, 15, 1, 1], [0, 0, 0, 0]]
+    assert cv2.imreadanimation(str(file))[1].frames[2][31, 201].tolist()[:3] == [255, 255, 255]
+    with pytest.raises(ValueError, match="16383 pixels at most"):
+        write_animation(file, [np.zeros((1, 16384, 3), np.uint8)], 10)
 
 
 def test_a_gif_plays_at_the_rate(tmp_path):

@@ -9,6 +9,7 @@ import pytest
 from benches.peer_batch import make_shot as make_large_shot
 from pegbar.cli.main import main
 from tests.cli.interruptions import contents, start, wait_for
+from tests.cli.pipeline import kill_and_compare, write_shot
 from tests.shots import make_shot
 
 
@@ -23,6 +24,11 @@ def test_twenty_kills_and_one_whole_run_give_the_undisturbed_bytes(tmp_path):
         process.communicate(timeout=60)
     assert main(["composite", str(shot)]) == 0
     assert contents(shot.parent / "final") == contents(whole.parent / "final")
+
+
+def test_the_whole_batch_killed_at_twenty_random_moments_gives_the_undisturbed_bytes(tmp_path):
+    write_shot(tmp_path / "shot", 12, (240, 136))
+    assert kill_and_compare(tmp_path / "shot", 20, random.Random()) == []
 
 
 def test_a_4k_frame_is_composited(tmp_path):

@@ -1,9 +1,13 @@
+import cv2
 import numpy as np
 import pytest
 
-from pegbar.puppet.layers import cut_layers, plan_layers
+from pegbar.io.motion import read_motion
+from pegbar.io.puppet_input import read_puppet_input
+from pegbar.puppet.layers import cut_layers, give_slivers, plan_layers
 from pegbar.puppet.limbs import drawn_limbs
-from pegbar.puppet.parts import grow_parts
+from pegbar.puppet.make import plan_figure, prepare_figure
+from pegbar.puppet.parts import Parts, grow_parts
 from pegbar.puppet.view import seen_pose
 from pegbar.scene.body import MARKERS
 from tests.figures import animal, clip, figure
@@ -68,3 +72,29 @@ def test_an_animal_has_a_layer_a_far_leg():
     assert plan.names[plan.names.index("body") + 1 :] == ("left hip b", "left hip f")
     assert {limb.kind for limb in limbs} == {"arm", "leg", ""}
     assert sorted(bone for bones in plan.bones for bone in bones) == list(range(len(animal().bones)))
+
+
+def test_outlines_along_a_limb_are_the_limb_s_and_a_tail_is_the_body_s():
+    body, leg = np.zeros((60, 80), bool), np.zeros((60, 80), bool)
+    body[10:30, 10:70] = True
+    leg[30:55, 40:55] = True
+    thorn, tail = np.zeros_like(body), np.zeros_like(body)
+    thorn[30:48, 37:40] = True
+    tail[30:48, 15:18] = True
+    drawn = [body | thorn | tail, leg]
+    give_slivers(drawn, 0, 7.0)
+    assert (drawn[0] & thorn).sum() < 0.2 * thorn.sum()
+    assert (drawn[1] & thorn).sum() > 0.8 * thorn.sum()
+    assert drawn[0][tail].all()
+    assert drawn[0][body].all()
+    assert not (drawn[0] & drawn[1]).any()
+
+
+def test_nothing_hidden_is_a_sliver(test_data):
+    figure_ = prepare_figure(read_puppet_input(test_data / "annotated/morevna_side_walk/annotation.json"))
+    plan = plan_figure(figure_, read_motion(test_data / "mocap/bvh/cmu_07_01.bvh"))
+    layers = cut_layers(figure_, figure_.mask, Parts(figure_.bone_map, figure_.radii), plan.layers)
+    assert len(layers) == 5
+    for layer in layers:
+        thick = cv2.morphologyEx(layer.region.view(np.uint8), cv2.MORPH_OPEN, np.ones((5, 5), np.uint8)) > 0
+        assert (layer.region & ~layer.drawn & ~thick).sum() <= 10, layer.name

@@ -66,7 +66,7 @@ def test_a_following_camera_moves_what_stands_still():
     assert still.meshes[-1, :, 0].mean() - still.meshes[0, :, 0].mean() == pytest.approx(300, rel=0.01)
     assert abs(following.meshes[-1, :, 0].mean() - following.meshes[0, :, 0].mean()) < 40
     assert following.shift[-1, 0] < -260
-    with pytest.raises(ValueError, match="want a camera"):
+    with pytest.raises(ValueError, match="want camera of"):
         perform(puppet, clip(poses), Direction(camera="shaky"))
 
 

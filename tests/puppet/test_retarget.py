@@ -66,7 +66,7 @@ def test_the_pose_in_which_the_picture_was_recognised_is_as_drawn():
     assert np.allclose(found[0], rest)
     assert np.allclose(lengths(found), lengths(rest[None]))
     # The forearm stays as far above its line as it was drawn, seen from the front.
-    assert found[1, 2, 1] - found[1, 1, 1] == pytest.approx(rest[2, 1] - rest[1, 1], rel=0.2)
+    assert found[1, 2, 1] - found[1, 1, 1] == pytest.approx(rest[2, 1] - rest[1, 1], rel=0.25)
 
 
 def test_a_limb_drawn_in_another_pose_follows_the_clip():
@@ -79,6 +79,79 @@ def test_a_limb_drawn_in_another_pose_follows_the_clip():
     assert np.allclose(stays[0], rest)
     never = retarget(moved(arm_puppet(), left_hand=(240, 80)), rest, poses, puppet.pose, keep="never")
     assert np.allclose(never[:, 2, 1], never[:, 1, 1], atol=1e-9)
+
+
+def test_a_drawn_difference_fades_as_the_clip_leaves_the_pose():
+    puppet = moved(arm_puppet(), left_hand=(230, 60))
+    rest = drawn_pose(puppet)
+    poses = turned_poses(puppet, [0.0, 20.0, 45.0])
+    found = retarget(puppet, rest, poses, puppet.pose)
+    assert np.allclose(found[0], rest)
+    above = found[:, 2, 1] - found[:, 1, 1]
+    assert 0.2 * above[0] < above[1] < 0.8 * above[0]
+    assert above[2] == pytest.approx(0, abs=1e-9)
+
+
+def test_no_limb_is_longer_than_its_partner_because_the_actor_s_is_foreshortened():
+    base = arm_puppet(distance=6.0)
+    names = ("neck", "left_elbow", "left_hand", "right_elbow", "right_hand")
+    marks = np.array([[150.0, 100.0], [190.0, 100.0], [230.0, 100.0], [110.0, 100.0], [70.0, 100.0]])
+    pose = base.camera.unproject(marks, np.full(5, 6.0))
+    pose[4] = pose[3] + [-0.2, 0.0, 0.35]
+    # The actor's hand is where it is drawn, but nearer.
+    pose[4] = base.camera.unproject(marks[4], 5.6)
+    puppet = base.changed(
+        names=names,
+        marks=marks,
+        bones=np.array([[0, 1], [1, 2], [0, 3], [3, 4]]),
+        drives={name: name for name in names},
+        pose=pose,
+        joint_handles=np.full(5, -1),
+        bone_layer=np.zeros(4, np.int64),
+    )
+    drawn = drawn_pose(puppet)
+    assert np.allclose(puppet.camera.project(drawn), marks)
+    left, right = (np.linalg.norm(drawn[b] - drawn[a]) for a, b in ((1, 2), (3, 4)))
+    assert right == pytest.approx(left, rel=0.02)
+    # Where both are nearer both are as long as the clip says.
+    pose[2] = base.camera.unproject(marks[2], 5.6)
+    both = drawn_pose(puppet.changed(pose=pose))
+    assert np.linalg.norm(both[2] - both[1]) > 1.5 * left
+
+
+def test_the_trunk_of_an_animal_stays_whole_and_seen_from_its_side():
+    base = arm_puppet(distance=6.0)
+    names = ("pelvis", "neck", "left_hip", "left_knee", "left_shoulder", "left_elbow")
+    marks = np.array([[100.0, 90], [200.0, 90], [100.0, 110], [100.0, 150], [200.0, 110], [200.0, 150]])
+    drawn = base.camera.unproject(marks, np.full(6, 6.0))
+    puppet = base.changed(
+        names=names,
+        marks=marks,
+        bones=np.array([[0, 1], [0, 2], [2, 3], [1, 4], [4, 5]]),
+        drives={name: name for name in names},
+        pose=drawn,
+        fitted=False,
+        joint_handles=np.full(6, -1),
+        bone_layer=np.zeros(5, np.int64),
+    )
+    person = np.array([[0, 1, 0], [0, 1.5, 0], [0.1, 0.95, 0], [0.1, 0.5, 0], [0.2, 1.4, 0], [0.2, 1.0, 0]], float)
+    bow = Rotation.from_euler("z", -20, degrees=True).as_matrix()
+    lean = Rotation.from_euler("x", 50, degrees=True).as_matrix()
+    clip = np.stack([person, person @ bow.T, person @ lean.T, person])
+    # The upper arm points at the camera.
+    clip[3, 5] = clip[3, 4] + [0, 0, 0.4]
+    rest = drawn_pose(puppet)
+    found = retarget(puppet, rest, clip, person)
+    assert np.allclose(found[0], rest)
+    trunk = found[:, [0, 1, 2, 4]]
+    apart = np.linalg.norm(trunk[:, :, None] - trunk[:, None], axis=3)
+    assert np.allclose(apart, apart[:1])
+    # It tilts in the picture as the person bows, and never out of it.
+    assert np.allclose(trunk[:, :, 2], trunk[:1, :, 2])
+    slope = found[1, 1] - found[1, 0]
+    assert np.degrees(np.arctan2(slope[1], slope[0])) == pytest.approx(-20, abs=1)
+    legs = np.linalg.norm((found[:, 5] - found[:, 4])[:, :2], axis=1)
+    assert (legs > 0.79 * legs[0]).all()
 
 
 def test_what_no_marker_moves_goes_with_its_parent():

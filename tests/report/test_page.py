@@ -2,6 +2,7 @@ import base64
 from html.parser import HTMLParser
 
 from pegbar.report.page import Picture, Section, data_address, html_page
+from tests.pages import complaints
 
 
 class Elements(HTMLParser):
@@ -56,3 +57,19 @@ def test_a_page_asks_for_nothing_outside():
 def test_a_video_in_the_page_gets_a_player():
     assert Picture(data_address(b"1", ".mp4"), "").is_video
     assert not Picture(data_address(b"1", ".png"), "").is_video
+
+
+def test_what_a_page_lacks_offline_is_found(tmp_path):
+    section = Section("s", files=(("b c.txt", "f"),), pictures=(Picture("a.png", "p"), Picture("http://x/y.png", "q")))
+    page = tmp_path / "page.html"
+    page.write_text(html_page("t", "w", [section]) + "<style>p{background:url(z.png)}</style><script></script>")
+    assert complaints(page) == [
+        "a script",
+        "no such file: b c.txt",
+        "no such file: a.png",
+        "asks for http://x/y.png",
+        "no such file: z.png",
+    ]
+    for name in ("a.png", "b c.txt", "z.png"):
+        (tmp_path / name).touch()
+    assert complaints(page) == ["a script", "asks for http://x/y.png"]

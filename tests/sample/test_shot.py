@@ -13,6 +13,7 @@ from pegbar.sample.figure import PALETTE
 from pegbar.sample.shot import make_frame, make_scene, write_sample
 from pegbar.sample.skeleton import NAMES
 from pegbar.scene.camera import PerspectiveCamera
+from pegbar.shot.dots_stage import DotsStage
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +38,7 @@ def digest(folder):
 def test_the_same_bits_whatever_the_workers(written, tmp_path):
     write_sample(tmp_path, size=(192, 108), frames=6, workers=1)
     assert digest(tmp_path) == digest(written.parent)
-    assert len(digest(tmp_path)) == 3 * 6 + 4
+    assert len(digest(tmp_path)) == 4 * 6 + 5
 
 
 def test_everything_that_is_named_is_there(written):
@@ -159,3 +160,17 @@ def test_the_elements_pass_before_and_behind_limbs_in_every_part_of_the_dance(sc
         body = scene.cameras[index].depth(scene.pose(index).at("chest"))
         assert (frame.passes.depth[figure] < body).sum() > 50
         assert (frame.passes.depth[figure] > body).sum() > 50
+
+
+def test_the_dots_give_the_annotated_marks(tmp_path):
+    write_sample(tmp_path, size=(960, 540), frames=2, samples=1)
+    stage = DotsStage(tmp_path / "dots.toml")
+    stage.run()
+    found, known = read_annotations(stage.output), read_annotations(tmp_path / "annotation.json")
+    assert found.names == known.names
+    assert np.array_equal(found.visible, known.visible)
+    assert 30 < known.visible.sum() < known.visible.size
+    # Half a pixel of a dot's own; more where a later dot covers part of an earlier one.
+    away = np.linalg.norm(found.markers - known.markers, axis=2)[known.visible]
+    assert np.median(away) < 0.3
+    assert away.max() < 3

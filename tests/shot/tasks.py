@@ -2,6 +2,7 @@
 
 import os
 import signal
+import stat
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -39,3 +40,33 @@ class Slow:
         (self.folder / f"{os.getpid()}").touch()
         time.sleep(0.05)
         return frame
+
+
+@dataclass(frozen=True)
+class Large:
+    data: bytes
+
+    def __call__(self, frame):
+        return len(self.data) + frame
+
+
+class Fragile:
+    """Frame 2 dies in the middle of its answer: a part of the message is in the pipe."""
+
+    def __call__(self, frame):
+        if frame == 2:
+            for descriptor in range(3, 64):
+                try:
+                    if stat.S_ISSOCK(os.fstat(descriptor).st_mode):
+                        os.write(descriptor, (1000).to_bytes(4, "big") + b"half")
+                except OSError:
+                    continue
+            os.kill(os.getpid(), signal.SIGKILL)
+        return frame
+
+
+class Blocked:
+    """The signals that are held back in the worker."""
+
+    def __call__(self, frame):
+        return signal.pthread_sigmask(signal.SIG_BLOCK, ())

@@ -1,15 +1,18 @@
+import dataclasses
 import json
+import shutil
 
 import numpy as np
 import pytest
 
-from pegbar import read_annotations
+from pegbar import read_annotations, write_annotations
 from pegbar.cli.main import main
 from pegbar.errors import FormatError, ShotError
 from pegbar.io.alignment import read_alignment
 from pegbar.sample.shot import write_sample
 from pegbar.shot.align_stage import AlignStage
 from pegbar.shot.plan import open_shot
+from tests.pages import complaints
 
 
 @pytest.fixture(scope="module")
@@ -161,7 +164,7 @@ def test_the_report_has_a_section_for_each_stage_that_has_run(made, capsys):
     assert [title for title in titles if f"<h2>{title}</h2>" in text] == ["The shot", "Alignment"]
     assert text.count("data:image/png;base64,") in (3, 4)  # 4 after a test has made a depth picture
     assert "Out of date" not in text
-    assert "http" not in text
+    assert complaints(page) == []
     settings = made.read_text()
     made.write_text(settings + "\n[align]\nsmoothing = 3\n")
     assert main(["report", str(made), "-o", str(page)]) == 0
@@ -180,3 +183,74 @@ def test_a_clip_without_the_drawn_poses_is_warned_of_however_long_its_limbs(made
         assert "warning: the clip does not fit: the limbs of ad_fair1_jumping.bvh are" in capsys.readouterr().err
     finally:
         made.write_text(settings)
+
+
+def test_check_tells_of_the_cameras_error(made, capsys, monkeypatch):
+    command = ["check", str(made), "--jobs", "1"]
+    assert main(command) == 0, capsys.readouterr().err
+    found = read_alignment(made.parent / "align" / "alignment.npz")
+
+    def told(errors):
+        changed = dataclasses.replace(found, errors=np.array(errors, float))
+        monkeypatch.setattr("pegbar.shot.check_sections.read_alignment", lambda _: changed)
+        assert main(command) == 1
+        return capsys.readouterr().err.splitlines()
+
+    (line,) = told([1.0] * 6 + [60.0] + [1.0] * 9)
+    assert "drawing.annotations: drawing 7: camera error 60 px, " in line
+    assert "-> look at its marks" in line
+    (line,) = told([50.0] * 16)
+    assert "clip: camera error 50 px" in line
+    assert "does not fit -> another clip" in line
+    text = made.read_text()
+    made.write_text(text + "\n[align]\nsmoothing = 2\n")
+    try:
+        assert main(command) == 1
+        assert "align: " in (line := capsys.readouterr().err)
+        assert "out of date: marks, clip, settings" in line
+        assert line.rstrip().endswith("-> pegbar align")
+    finally:
+        made.write_text(text)
+
+
+def test_a_clip_that_is_not_there_is_named_with_key_and_line(made, capsys):
+    text = made.read_text()
+    made.write_text(text.replace('path = "clip.bvh"', 'path = "clap.bvh"'))
+    try:
+        assert main(["align", str(made)]) == 2
+        number = made.read_text().splitlines().index('path = "clap.bvh"') + 1
+        assert f"{made}:{number}: clip.path: " in (line := capsys.readouterr().err)
+        assert "clap.bvh: no such file" in line
+    finally:
+        made.write_text(text)
+
+
+def test_marks_outside_the_picture_are_warned_of(made, tmp_path, capsys):
+    folder = tmp_path / "shot"
+    shutil.copytree(made.parent, folder, ignore=shutil.ignore_patterns("align"))
+    marks = read_annotations(folder / "annotation.json")
+    place = marks.names.index("left_hand")
+    marks.visible[[2, 3, 5], place] = True
+    marks.markers[[2, 3, 5], place] = (-20, 60)
+    write_annotations(folder / "annotation.json", marks)
+    assert main(["align", str(folder / made.name)]) == 0
+    warnings = [line for line in capsys.readouterr().err.splitlines() if "warning: left_hand is marked outside" in line]
+    assert len(warnings) == 1
+    assert "240 x 136 picture in drawings 3-4, 6" in warnings[0]
+
+
+def test_what_a_killed_run_has_half_written_is_not_up_to_date(made, monkeypatch):
+    """A run with other settings leaves some of its files: back at the first settings all are made again."""
+
+    def killed(*_):
+        raise KeyboardInterrupt
+
+    stage = AlignStage(open_shot(made, aligned=False), overwrite=True)
+    monkeypatch.setattr(AlignStage, "_write", killed)
+    with pytest.raises(KeyboardInterrupt):
+        stage.run()
+    assert all(path.is_file() for path in stage.outputs())
+    assert not AlignStage(open_shot(made, aligned=False)).is_done()
+    monkeypatch.undo()
+    assert main(["align", str(made)]) == 0
+    assert AlignStage(open_shot(made, aligned=False)).is_done()

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from pegbar.shot.batch import run_frames
-from tests.shot.tasks import Die, Slow, Square, Threads
+from tests.shot.tasks import Blocked, Die, Fragile, Slow, Square, Threads
 
 
 @pytest.mark.parametrize("jobs", [1, 3])
@@ -57,6 +57,71 @@ if __name__ == "__main__":
     parent.wait()
     parent.stdout.close()
     assert_gone(int(path.name) for path in tmp_path.iterdir())
+
+
+def run_script(path, code):
+    """Run a script of its own, which fails the test where it hangs."""
+    path.write_text(code)
+    environment = {**os.environ, "PYTHONPATH": os.getcwd()}
+    return subprocess.run([sys.executable, path], capture_output=True, text=True, env=environment, timeout=60)
+
+
+# More than a pipe holds.
+LARGE = "Large(bytes(300_000)), [1, 2, 3, 4, 5], jobs=2"
+
+
+def test_a_script_without_a_guard_is_told_what_to_do_and_does_not_hang(tmp_path):
+    code = f"""
+from pegbar.shot.batch import run_frames
+from tests.shot.tasks import Large
+print(sorted(r.value for r in run_frames({LARGE})))
+"""
+    done = run_script(tmp_path / "bare.py", code)
+    assert done.returncode == 1
+    assert "ChildProcessError: the worker processes cannot start (exit code 1)" in done.stderr
+    assert 'if __name__ == "__main__":' in done.stderr.splitlines()[-1]
+    assert done.stderr.count("Traceback") == 1
+    guarded = code.replace("print", 'if __name__ == "__main__":\n    print')
+    assert run_script(tmp_path / "guarded.py", guarded).stdout == "[300001, 300002, 300003, 300004, 300005]\n"
+
+
+def test_workers_that_are_killed_before_they_read_a_large_task_fail_their_frames_only(tmp_path):
+    code = f"""
+import os, signal
+from pegbar.shot.batch import run_frames
+from tests.shot.tasks import Large
+if __name__ == "__main__":
+    for r in run_frames({LARGE}):
+        print(r.frame, r.error or r.value)
+else:
+    for ticket in ("{tmp_path}/one", "{tmp_path}/two"):
+        try:
+            os.rmdir(ticket)
+        except FileNotFoundError:
+            continue
+        os.kill(os.getpid(), signal.SIGKILL)
+"""
+    for ticket in ("one", "two"):
+        (tmp_path / ticket).mkdir()
+    lines = run_script(tmp_path / "killed.py", code).stdout.splitlines()
+    dead = [line for line in lines if "the worker process ended (exit code -9): is the memory full?" in line]
+    assert len(dead) == 2
+    assert {line for line in lines if line not in dead} < {f"{n} {300_000 + n}" for n in range(1, 6)}
+    assert len(lines) == 5
+
+
+def test_a_worker_that_is_killed_while_it_answers_fails_its_frame_only():
+    results = {r.frame: r for r in run_frames(Fragile(), [1, 2, 3, 4], jobs=2)}
+    assert "worker process ended" in results[2].error
+    assert [results[f].value for f in (1, 3, 4)] == [1, 3, 4]
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="no signal masks here")
+def test_workers_begin_with_ctrl_c_held_back_and_the_parent_keeps_it():
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, ())
+    masks = [r.value for r in run_frames(Blocked(), [1, 2, 3], jobs=2)]
+    assert all(signal.SIGINT in mask for mask in masks)
+    assert signal.pthread_sigmask(signal.SIG_BLOCK, ()) == before
 
 
 def assert_gone(processes, seconds=5.0):

@@ -97,3 +97,15 @@ def test_a_shot_without_dots_says_so(tmp_path, capsys):
     (tmp_path / "shot.toml").write_text(text[: text.index("[dots]")])
     assert main(["dots", str(tmp_path / "shot.toml")]) == 2
     assert "no [dots]" in capsys.readouterr().err
+
+
+def test_a_colour_of_a_limb_that_is_none_is_named(tmp_path, capsys):
+    make(tmp_path)
+    shot = tmp_path / "shot.toml"
+    text = shot.read_text()
+    shot.write_text(text + 'limbs = { left_forearm = "#ff8000", left_wing = "#00ff00" }\n')
+    assert main(["dots", str(shot)]) == 2
+    told = capsys.readouterr().err
+    assert "dots.limbs: no limb left_wing between joints that have dots" in told
+    assert "left_forearm" in told
+    assert not (tmp_path / "marks.json").exists()

@@ -6,15 +6,14 @@ import math
 import os
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 from cyclopts import Parameter
 
 from pegbar.cli.batch import progress
-from pegbar.scene.alignment import Alignment
-from pegbar.shot.align_stage import AlignStage
-from pegbar.shot.plan import open_shot
+
+if TYPE_CHECKING:
+    from pegbar.scene.alignment import Alignment
 
 _ROOTS = {"in_place": "stays in place", "travel": "travels"}
 
@@ -31,6 +30,9 @@ def align(
     shot
         The shot file.
     """
+    from pegbar.shot.align_stage import AlignStage
+    from pegbar.shot.plan import open_shot
+
     stage = AlignStage(open_shot(shot, aligned=False), overwrite)
     with progress("align", len(stage.numbers)) as advance:
         alignment, made = stage.run(lambda _done, _all: advance())
@@ -51,6 +53,8 @@ def print_remarks(alignment: Alignment) -> None:
 
 def summary(alignment: Alignment) -> str:
     """Return camera, error and what was guessed in one line."""
+    import numpy as np
+
     camera = alignment.cameras[0]
     usual, worst = float(np.median(alignment.errors)), int(np.argmax(alignment.errors))
     parts = [

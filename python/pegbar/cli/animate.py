@@ -9,26 +9,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
 from pegbar.errors import MissingExtraError, describe
-from pegbar.io.film import ANIMATIONS, check_film, is_sequence
-from pegbar.io.video import SUFFIXES
-from pegbar.puppet.performance import Direction
-from pegbar.puppet.staging import Setting
-from pegbar.shot.animating import (
-    Advance,
-    Casting,
-    Outcome,
-    Part,
-    animate_parts,
-    find_clips,
-    find_pictures,
-    picture_name,
-)
-from pegbar.shot.puppet import PuppetOptions
+
+if TYPE_CHECKING:
+    from pegbar.puppet.performance import Direction
+    from pegbar.puppet.staging import Setting
+    from pegbar.shot.animating import Advance, Casting, Outcome, Part
 
 
 @Parameter(name="*")
@@ -65,6 +55,9 @@ class FigureOptions:
 
     def casting(self, folder: Path) -> Casting:
         """As values, checked; puppets are kept beside what is in ``folder``."""
+        from pegbar.shot.animating import Casting
+        from pegbar.shot.puppet import PuppetOptions
+
         wide = self.field_of_view
         if wide is not None and not 0 < wide < 180:
             raise ValueError(f"--field-of-view: want degrees between 0 and 180, got {wide}")
@@ -106,6 +99,9 @@ class MovementOptions:
         Literal["near", "always", "never"],
         Parameter(help="Whether limbs drawn otherwise than in the clip stay so: near keeps small differences."),
     ] = "near"
+    feet: Annotated[
+        Literal["locked", "free"], Parameter(help="Whether feet that stand in the clip keep their place on the ground.")
+    ] = "locked"
     transition: Annotated[float, Parameter(help="Seconds from the drawn pose to the clip's first.")] = 0.0
     between: Annotated[float, Parameter(help="Seconds from one clip to the next.")] = 0.3
     loop: Annotated[bool, Parameter(negative="", help="Cut and blend so that it repeats without a jump.")] = False
@@ -113,6 +109,8 @@ class MovementOptions:
 
     def direction(self) -> Direction:
         """As values, checked."""
+        from pegbar.puppet.performance import Direction
+
         first, last = _range(self.frames)
         for name in ("transition", "between", "inflation"):
             if not 0 <= getattr(self, name) <= 60:
@@ -122,6 +120,7 @@ class MovementOptions:
             first=first,
             last=last,
             keep=self.keep,
+            feet=self.feet,
             travel=self.travel,
             camera=self.camera,
             transition=self.transition,
@@ -148,6 +147,8 @@ class PictureOptions:
 
     def setting(self) -> Setting:
         """As values, checked."""
+        from pegbar.puppet.staging import Setting
+
         size = None if self.size is None else re.fullmatch(r"(\d{1,5})x(\d{1,5})", self.size)
         if self.size is not None and size is None:
             raise ValueError(f"--size: want WIDTHxHEIGHT, like 500x500, got {self.size!r}")
@@ -184,6 +185,9 @@ def animate(
     pictures
         Pictures with their joints beside them, or folders of such.
     """
+    from pegbar.io.film import check_film
+    from pegbar.shot.animating import find_clips, find_pictures
+
     direction = (movement or MovementOptions()).direction()
     setting = (look or PictureOptions()).setting()
     cast = [picture for path in pictures for picture in find_pictures(path)]
@@ -193,7 +197,17 @@ def animate(
     jobs = list(_jobs(cast, clips, output, format))
     for _, target in jobs:
         check_film(target, alpha=setting.background == "transparent")
-    casting, failed = (figure or FigureOptions()).casting(jobs[0][1].parent), 0
+    casting = (figure or FigureOptions()).casting(jobs[0][1].parent)
+    return _perform(jobs, casting, direction, setting, keep_going)
+
+
+def _perform(
+    jobs: list[tuple[list[Part], Path]], casting: Casting, direction: Direction, setting: Setting, keep_going: bool
+) -> int:
+    """Write every scene, report, and return the exit code."""
+    from pegbar.shot.animating import animate_parts
+
+    failed = 0
     for parts, target in jobs:
         try:
             with _bar(target.name) as advance:
@@ -208,12 +222,16 @@ def animate(
             if not keep_going:
                 break
         else:
-            _report(outcome)
+            _report(outcome, f"{target.name}: " if len(jobs) > 1 else "")
     return 1 if failed else 0
 
 
 def _jobs(cast: list[Path], clips: list[Path], output: Path, format: str) -> Iterator[tuple[list[Part], Path]]:
     """Scenes and where they go: one scene in a file, every picture with every clip in a folder."""
+    from pegbar.io.film import ANIMATIONS, check_film, is_sequence
+    from pegbar.io.video import SUFFIXES
+    from pegbar.shot.animating import Part, picture_name
+
     if output.suffix.lower() in (*ANIMATIONS, *SUFFIXES) or is_sequence(output):
         if len(cast) == 1:
             yield [Part(cast[0], tuple(clips))], output
@@ -255,9 +273,9 @@ def _bar(name: str) -> Iterator[Advance | None]:
         yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
-def _report(outcome: Outcome) -> None:
+def _report(outcome: Outcome, name: str) -> None:
     for note in outcome.notes:
-        print(f"pegbar: warning: {note}", file=sys.stderr)
+        print(f"pegbar: warning: {name}{note}", file=sys.stderr)
     pace = outcome.frames / max(outcome.seconds - outcome.setup, 1e-9)
     print(
         f"animate: {outcome.output}: {outcome.frames} pictures, {outcome.setup:.1f} s to the first, "

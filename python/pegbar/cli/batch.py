@@ -6,15 +6,19 @@ import os
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from pegbar.io.hold import BusyError, hold
 from pegbar.io.numbers import format_frames, parse_frames
-from pegbar.shot.batch import FrameResult, run_frames
-from pegbar.shot.stages import Stage
+
+if TYPE_CHECKING:
+    from pegbar.shot.batch import FrameResult
+    from pegbar.shot.stages import Stage
 
 
 @Parameter(name="*")
@@ -47,6 +51,27 @@ def run_stage(name: str, stage: Stage, options: BatchOptions) -> int:
     if not frames:
         raise ValueError("the shot has no frames")
     stage.prepare(frames)
+    with _alongside(stage.outputs(frames[0])[0].parent):
+        return _run(name, stage, frames, options)
+
+
+@contextmanager
+def _alongside(folder: Path) -> Iterator[None]:
+    """Tell of another run in ``folder`` and go on: frames are complete or absent, so two runs only work twice."""
+    with ExitStack() as stack:
+        try:
+            stack.enter_context(hold(folder))
+        except BusyError as error:
+            print(f"pegbar: note: {str(error).rpartition(':')[0]}: frames may be made twice", file=sys.stderr)
+        except OSError:
+            # Frames that are up to date need no right to write; others say what is wrong themselves.
+            pass
+        yield
+
+
+def _run(name: str, stage: Stage, frames: list[int], options: BatchOptions) -> int:
+    from pegbar.shot.batch import run_frames
+
     # Told here, so that no worker is started for frames that need none.
     todo = [frame for frame in frames if not stage.is_done(frame)]
     count = Counter({"up to date": len(frames) - len(todo)})

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import re
+import json
 import sys
-from contextlib import closing
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from pegbar.cli.batch import BatchOptions, progress
-from pegbar.errors import ShotError
-from pegbar.io.numbers import format_frames
-from pegbar.shot.batch import run_frames
-from pegbar.shot.check import CheckStage
-from pegbar.shot.check_sections import section_problems
-from pegbar.shot.plan import open_shot
+
+if TYPE_CHECKING:
+    from pegbar.shot.problem import Problem
 
 
 def check(
@@ -24,6 +20,9 @@ def check(
     *,
     frames: Annotated[str | None, Parameter(help="Frames to check, like 1-48 (default: the shot's).")] = None,
     jobs: Annotated[int | None, Parameter(help="Worker processes (default: one a core).")] = None,
+    as_json: Annotated[
+        bool, Parameter(name="--json", negative="", help="Print the problems as JSON, with places.")
+    ] = False,
 ) -> int:
     """Report every problem of a shot; see `pegbar check --help`.
 
@@ -32,34 +31,30 @@ def check(
     shot
         The shot file.
     """
-    try:
-        plan = open_shot(shot)
-    except ShotError as error:
-        print(error, file=sys.stderr)
-        return 1
-    chosen = BatchOptions(frames=frames, jobs=jobs).select(plan.frames)
-    problems: dict[int, list[str]] = {}
-    with closing(run_frames(CheckStage(plan), chosen, jobs=jobs)) as results, progress("check", len(chosen)) as advance:
-        for result in results:
-            advance()
-            problems[result.frame] = [result.error] if result.error else list(result.value)
-    lines = section_problems(plan) + grouped([line for frame in sorted(problems) for line in problems[frame]])
-    for line in lines:
-        print(line, file=sys.stderr)
-    print(f"check: {len(chosen)} frames read, {len(lines) or 'no'} problem{'' if len(lines) == 1 else 's'}")
-    return 1 if lines else 0
+    from pegbar.shot.preflight import preflight
+
+    problems, read = preflight(shot, BatchOptions(frames=frames, jobs=jobs).select, jobs, progress)
+    if as_json:
+        print(json.dumps({"frames_read": read, "problems": [problem.record() for problem in problems]}, indent=1))
+    else:
+        _print(problems)
+        print(f"check: {read} frames read, {len(problems) or 'no'} problem{'' if len(problems) == 1 else 's'}")
+    return 1 if problems else 0
 
 
-def grouped(lines: list[str]) -> list[str]:
-    """Return ``lines`` with those that differ in numbers only as one, which says how many frames it stands for."""
-    groups: dict[str, list[str]] = {}
-    for line in lines:
-        groups.setdefault(re.sub(r"\d+", "#", line), []).append(line)
-    merged = []
-    for same in groups.values():
-        if len(same) < 4:
-            merged += same
-        else:
-            frames = [int(number[1]) for line in same if (number := re.match(r"frame (-?\d+):", line))]
-            merged.append(f"{same[0]} (and so in {len(same)} frames: {format_frames(frames)})")
-    return merged
+def _print(problems: list[Problem]) -> None:
+    """A table on a terminal, a line a problem elsewhere."""
+    if not sys.stderr.isatty():
+        for problem in problems:
+            print(problem.line, file=sys.stderr)
+        return
+    if problems:
+        from rich.console import Console
+        from rich.table import Column, Table
+        from rich.text import Text
+
+        columns = [Column(name, overflow="fold") for name in ("where", "what", "how to mend")]
+        table = Table(*columns, show_lines=True)
+        for problem in problems:
+            table.add_row(*(Text(text) for text in (problem.where, problem.what, problem.mend)))
+        Console(stderr=True).print(table)

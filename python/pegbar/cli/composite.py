@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
 from pegbar.cli.batch import BatchOptions, run_stage
-from pegbar.shot.load import validate_shot
-from pegbar.shot.plan import Shot, open_shot, plan_shot
-from pegbar.shot.stages import CompositeStage
+
+if TYPE_CHECKING:
+    from pegbar.shot.plan import Shot
 
 
 @Parameter(name="*")
@@ -60,6 +60,8 @@ def composite(shot: Path | None = None, files: FileOptions | None = None, option
     shot
         The shot file; without one, give at least --drawings, --beauty and --output.
     """
+    from pegbar.shot.stages import CompositeStage
+
     options = options or BatchOptions()
     plan = _plan(shot, files or FileOptions())
     if plan.beauty is None:
@@ -68,6 +70,9 @@ def composite(shot: Path | None = None, files: FileOptions | None = None, option
 
 
 def _plan(path: Path | None, files: FileOptions) -> Shot:
+    from pegbar.shot.load import validate_shot
+    from pegbar.shot.plan import open_shot, plan_shot
+
     given = {field.name: getattr(files, field.name) for field in fields(files)}
     given = {name: value for name, value in given.items() if value is not None}
     if path is not None:

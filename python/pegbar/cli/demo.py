@@ -5,24 +5,20 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 from cyclopts import Parameter
-from numpy.typing import NDArray
 
 from pegbar.cli.batch import BatchOptions, progress, run_stage
 from pegbar.cli.lift import lift
 from pegbar.cli.secondary import secondary
-from pegbar.io import atomic
-from pegbar.io.animation import write_animation
-from pegbar.io.frames import read_picture, write_image
-from pegbar.report.contact_sheet import contact_sheet, over_paper
-from pegbar.report.page import Picture, Section, html_page
-from pegbar.sample.shot import write_sample
-from pegbar.shot.animating import Casting, Part, animate_parts
-from pegbar.shot.plan import Shot, open_shot
-from pegbar.shot.stages import CompositeStage, DepthStage
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from pegbar.report.page import Section
+    from pegbar.shot.plan import Shot
 
 SHEET = 12
 
@@ -40,6 +36,17 @@ def demo(
     folder
         Where to put it; made if it is not there.
     """
+    from pegbar.io.hold import hold
+
+    with hold(folder):
+        return _make(folder, length, jobs)
+
+
+def _make(folder: Path, length: int, jobs: int | None) -> int:
+    from pegbar.io import atomic
+    from pegbar.report.page import html_page
+    from pegbar.sample.shot import write_sample
+
     start = time.perf_counter()
     with progress("sample", length) as advance:
         path = write_sample(folder, frames=length, workers=jobs, progress=lambda *_: advance())
@@ -50,11 +57,7 @@ def demo(
         jobs_done += [secondary(path, options), lift(path)]
     if code := max(jobs_done):
         return code
-    animated = folder / "animated.gif"
-    first = Part(folder / "drawings/dancer.0001.png", (folder / "clip.bvh",))
-    animate_parts(
-        [first], animated, casting=Casting(joints=folder / "annotation.json", keep=folder / ".pegbar/puppets")
-    )
+    _animate(folder)
     page = folder / "index.html"
     atomic.write_bytes(page, html_page("pegbar: the sample shot", _LEAD, _sections(folder)).encode())
     print(f"\nMade in {time.perf_counter() - start:.1f} s. Open {page} in a browser, or:")
@@ -86,11 +89,19 @@ def spread(frames: list[int], count: int) -> list[int]:
 
 def final_path(shot: Shot, frame: int) -> Path:
     """Return where the finished ``frame`` is."""
+    from pegbar.shot.stages import CompositeStage
+
     return CompositeStage(shot).outputs(frame)[0]
 
 
 def _composite(path: Path, options: BatchOptions) -> int:
     """Depth of the drawings, and the composite with the rendered hoop and ribbon."""
+    from pegbar.io.animation import write_animation
+    from pegbar.io.frames import write_image
+    from pegbar.report.contact_sheet import contact_sheet
+    from pegbar.shot.plan import open_shot
+    from pegbar.shot.stages import CompositeStage, DepthStage
+
     shot = open_shot(path)
     for name, stage in (("depth", DepthStage(shot)), ("composite", CompositeStage(shot))):
         if code := run_stage(name, stage, options):
@@ -102,8 +113,19 @@ def _composite(path: Path, options: BatchOptions) -> int:
     return 0
 
 
+def _animate(folder: Path) -> None:
+    """The first drawing performs the clip."""
+    from pegbar.shot.animating import Casting, Part, animate_parts
+
+    first = Part(folder / "drawings/dancer.0001.png", (folder / "clip.bvh",))
+    casting = Casting(joints=folder / "annotation.json", keep=folder / ".pegbar/puppets")
+    animate_parts([first], folder / "animated.gif", casting=casting)
+
+
 def _sections(folder: Path) -> list[Section]:
     """The three jobs, and what they begin with; those that have run."""
+    from pegbar.report.page import Picture, Section
+
     found = [
         Section(
             "What the artist gives",
@@ -148,16 +170,22 @@ def _there(section: Section, folder: Path) -> Section:
     """The section without what was not made."""
     pictures = tuple(picture for picture in section.pictures if (folder / picture.source).is_file())
     files = tuple(entry for entry in section.files if (folder / entry[0]).is_file())
-    return Section(section.title, section.words, files=files, pictures=pictures)
+    return type(section)(section.title, section.words, files=files, pictures=pictures)
 
 
 def _rows(shot: Shot, frame: int) -> Iterator[NDArray[np.uint8]]:
     """The drawing, its depth and the finished frame."""
+    from pegbar.io.frames import read_picture
+    from pegbar.shot.stages import DepthStage
+
     yield read_picture(shot.drawings.path(shot.exposure.drawing(frame)))
     yield read_picture(DepthStage(shot).outputs(frame)[1])
     yield read_picture(final_path(shot, frame))
 
 
 def _finals(shot: Shot, frames: list[int]) -> Iterator[NDArray[np.uint8]]:
+    from pegbar.io.frames import read_picture
+    from pegbar.report.contact_sheet import over_paper
+
     for frame in frames:
         yield over_paper(read_picture(final_path(shot, frame)))

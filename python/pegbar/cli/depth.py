@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from pegbar.cli.batch import BatchOptions, run_stage
-from pegbar.shot.plan import open_shot
-from pegbar.shot.stages import DepthStage
 
 
 def depth(shot: Path, *, options: BatchOptions | None = None) -> int:
@@ -17,5 +15,8 @@ def depth(shot: Path, *, options: BatchOptions | None = None) -> int:
     shot
         The shot file.
     """
+    from pegbar.shot.plan import open_shot
+    from pegbar.shot.stages import DepthStage
+
     options = options or BatchOptions()
     return run_stage("depth", DepthStage(open_shot(shot), options.overwrite), options)

@@ -9,8 +9,6 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from pegbar.shot.dots_stage import DotsStage
-
 
 def dots(
     shot: Path,
@@ -24,6 +22,8 @@ def dots(
     shot
         The shot file.
     """
+    from pegbar.shot.dots_stage import DotsStage
+
     stage = DotsStage(shot, overwrite)
     remarks, made = stage.run()
     for remark in remarks:

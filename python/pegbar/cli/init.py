@@ -7,14 +7,14 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from pegbar.io.atomic import complete_file
-from pegbar.shot.start import start_shot
-
 
 def init(
     frames: Path,
     *,
     drawings: Annotated[str | None, Parameter(help="The drawn frames, like d.####.png, if there is a choice.")] = None,
+    exposure: Annotated[
+        Path | None, Parameter(help="An exposure sheet (CSV or XDTS): which frame shows which.")
+    ] = None,
     output: Annotated[Path | None, Parameter(help="The shot file (default: FRAMES/shot.toml).")] = None,
     overwrite: Annotated[bool, Parameter(negative="", help="Replace a shot file that is there.")] = False,
 ) -> int:
@@ -25,13 +25,19 @@ def init(
     frames
         The folder with the drawn frames.
     """
+    from pegbar.io.atomic import complete_file
+    from pegbar.io.exposure_sheet import read_exposure_sheet
+    from pegbar.shot.start import start_shot
+
     if not frames.is_dir():
         raise NotADirectoryError(f"{frames}: no such folder")
     target = output or frames / "shot.toml"
     if target.exists() and not overwrite:
         raise FileExistsError(f"{target}: is there already (--overwrite replaces it)")
-    text = start_shot(frames, drawings)
+    text = start_shot(frames, drawings, exposure)
     with complete_file(target) as part:
         part.write_text(text, encoding="utf-8")
+    if exposure is not None and (moves := read_exposure_sheet(exposure).camera):
+        print(f"init: the sheet's camera moves are not used ({', '.join(moves)}): pegbar align finds the camera")
     print(f"init: wrote {target}; look it over, then run: pegbar check {target}")
     return 0

@@ -10,10 +10,6 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from pegbar.cli.align import print_remarks
-from pegbar.io.alignment import read_alignment
-from pegbar.shot.align_stage import AlignStage
-from pegbar.shot.lift_stage import LiftStage
-from pegbar.shot.plan import open_shot
 
 
 def lift(
@@ -28,6 +24,11 @@ def lift(
     shot
         The shot file.
     """
+    from pegbar.io.alignment import read_alignment
+    from pegbar.shot.align_stage import AlignStage
+    from pegbar.shot.lift_stage import LiftStage
+    from pegbar.shot.plan import open_shot
+
     stage = LiftStage(AlignStage(open_shot(shot, aligned=False)), overwrite)
     values, made = stage.run()
     print_remarks(read_alignment(stage.align.outputs()[0]))

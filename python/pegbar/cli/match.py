@@ -5,22 +5,20 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 from cyclopts import Parameter
-from numpy.typing import NDArray
 
-from pegbar.align.match import Matches, match_clips
 from pegbar.errors import describe
-from pegbar.io.annotations import read_annotations
-from pegbar.io.clip_folder import ClipFolder, read_clips
 from pegbar.io.numbers import format_frames, parse_frames
-from pegbar.report.match_table import describe_match, report_left_out, report_matches
-from pegbar.scene.body import MARKERS
-from pegbar.scene.drawing import Drawing
-from pegbar.shot.clip import clip_text, write_clip
-from pegbar.shot.load import load_shot
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from pegbar.align.match import Matches
+    from pegbar.io.clip_folder import ClipFolder
+    from pegbar.scene.drawing import Drawing
 
 # Drawings and matches on the contact sheet.
 _KEYS, _ROWS = 6, 8
@@ -50,6 +48,10 @@ def match(
     clips
         The folder of clips.
     """
+    from pegbar.io.annotations import read_annotations
+    from pegbar.report.match_table import report_left_out, report_matches
+    from pegbar.shot.load import load_shot
+
     if frame_rate is not None and not frame_rate > 0:
         raise ValueError(f"--frame-rate: want frames a second above 0, got {frame_rate}")
     if write is not None:
@@ -63,24 +65,26 @@ def match(
         return 1
     found = _search(drawing, chosen, folder, frame_rate, top)
     report_left_out(folder.broken, {**folder.skipped, **found.skipped})
-    report_matches(folder, found, (chosen + 1).tolist())
+    report_matches(folder, found, [place + 1 for place in chosen])
     if output is not None and found.matches:
         _write_sheet(output, drawing, chosen, folder, found)
     _write_choice(write, clips, found)
     return 0
 
 
-def _chosen(frames: str | None, count: int) -> NDArray[np.intp]:
+def _chosen(frames: str | None, count: int) -> list[int]:
     """Indices of the drawings to look at."""
     if frames is None:
-        return np.arange(count)
+        return list(range(count))
     wanted = sorted(parse_frames(frames))
     if strange := [number for number in wanted if not 1 <= number <= count]:
         raise ValueError(f"--frames: there is no drawing {format_frames(strange)} (there are {count})")
-    return np.array(wanted) - 1
+    return [number - 1 for number in wanted]
 
 
 def _read(clips: Path, index: bool) -> ClipFolder:
+    from pegbar.io.clip_folder import read_clips
+
     if not sys.stderr.isatty():
         return read_clips(clips, use_index=index)
     from rich.progress import Progress
@@ -92,9 +96,11 @@ def _read(clips: Path, index: bool) -> ClipFolder:
         )
 
 
-def _search(
-    drawing: Drawing, chosen: NDArray[np.intp], folder: ClipFolder, frame_rate: float | None, top: int
-) -> Matches:
+def _search(drawing: Drawing, chosen: list[int], folder: ClipFolder, frame_rate: float | None, top: int) -> Matches:
+    import numpy as np
+
+    from pegbar.align.match import match_clips
+
     holds = np.array(drawing.holds or [1] * len(drawing.markers), float)
     return match_clips(
         drawing.markers[chosen],
@@ -108,24 +114,29 @@ def _search(
     )
 
 
-def _write_sheet(output: Path, drawing: Drawing, chosen: NDArray[np.intp], folder: ClipFolder, found: Matches) -> None:
+def _write_sheet(output: Path, drawing: Drawing, chosen: list[int], folder: ClipFolder, found: Matches) -> None:
     # Pictures take long to import, and the table does without.
+    import numpy as np
+
     from pegbar.io.frames import write_image
     from pegbar.report.match_sheet import SheetRow, match_sheet
+    from pegbar.report.match_table import describe_match
+    from pegbar.scene.body import MARKERS
 
     keys = np.unique(np.linspace(0, len(chosen) - 1, min(len(chosen), _KEYS)).round().astype(int))
+    shown = [chosen[key] for key in keys]
     marks = np.full((len(keys), len(MARKERS), 2), np.nan)
     for place, name in enumerate(drawing.names):
         if name in MARKERS:
-            marks[:, MARKERS.index(name)] = drawing.markers[chosen[keys], place]
+            marks[:, MARKERS.index(name)] = drawing.markers[shown, place]
     clips = {clip.name: clip for clip in folder.clips}
     rows = []
     for rank, match in enumerate(found.matches[:_ROWS], 1):
         points = match.camera.project(match.markers(clips[match.clip])[keys])
         captions = tuple(f"frame {match.times[key]:.1f}" for key in keys)
         rows.append(SheetRow(describe_match(rank, match, clips[match.clip]), points, captions))
-    titles = [f"drawing {number}" for number in chosen[keys] + 1]
-    sheet = match_sheet(marks, titles, [_picture(drawing, number) for number in chosen[keys]], rows)
+    titles = [f"drawing {number + 1}" for number in shown]
+    sheet = match_sheet(marks, titles, [_picture(drawing, number) for number in shown], rows)
     output.mkdir(parents=True, exist_ok=True)
     write_image(output / "match.png", sheet)
     print(f"match: wrote {output / 'match.png'}")
@@ -144,6 +155,8 @@ def _picture(drawing: Drawing, number: int) -> NDArray[np.uint8] | None:
 
 def _write_choice(shot: Path | None, clips: Path, found: Matches) -> None:
     """Put the best match into the shot file, or print what to put there."""
+    from pegbar.shot.clip import clip_text, write_clip
+
     if not found.found:
         if shot is not None:
             print(f"match: {shot} is left as it is")

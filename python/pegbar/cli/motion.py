@@ -6,18 +6,16 @@ import json
 import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
 from pegbar.errors import describe
-from pegbar.io.frames import write_image
-from pegbar.io.joint_map import write_joint_map
-from pegbar.io.motion import read_motion
 from pegbar.io.numbers import format_frames, parse_frames
-from pegbar.scene.body import MARKERS
-from pegbar.scene.clip_report import ClipReport
-from pegbar.scene.motion import Motion
+
+if TYPE_CHECKING:
+    from pegbar.scene.clip_report import ClipReport
+    from pegbar.scene.motion import Motion
 
 _COLUMNS = ("clip", "frames", "rate", "seconds", "height", "unit", "up", "T-pose", "floor", "faces", "way", "joints")
 
@@ -37,6 +35,8 @@ class ClipOptions:
 
     def read(self, path: Path) -> tuple[Motion, ClipReport]:
         """The clip and what was found about it."""
+        from pegbar.io.motion import read_motion
+
         try:
             unit = None if self.unit is None else float(self.unit)
         except ValueError:
@@ -81,6 +81,8 @@ def info(
     for problem in errors.values():
         print(f"pegbar: {problem}", file=sys.stderr)
     if joints is not None and read:
+        from pegbar.io.joint_map import write_joint_map
+
         motion = read[0][1]
         write_joint_map(joints, motion.joint_map, derived=motion.derived)
         print(f"motion info: wrote {joints}", file=sys.stderr)
@@ -102,6 +104,7 @@ def plot(
     file
         A BVH, AMC or C3D file.
     """
+    from pegbar.io.frames import write_image
     from pegbar.report.pose_plot import plot_poses
 
     motion, _ = (options or ClipOptions()).read(file)
@@ -134,6 +137,8 @@ def _print_table(clips: list[tuple[Path, Motion, ClipReport]]) -> None:
 
 
 def _row(path: Path, motion: Motion, report: ClipReport) -> tuple[str, ...]:
+    from pegbar.scene.body import MARKERS
+
     count = len(motion.positions)
     name = report.unit_from.rpartition(": ")[2] if ":" in report.unit_from else ""
     faces = "-" if report.facing is None else " to ".join(dict.fromkeys(str(round(angle)) for angle in report.facing))

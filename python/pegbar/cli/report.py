@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
-
-from pegbar.io import atomic
-from pegbar.report.page import html_page
-from pegbar.shot.plan import open_shot
-from pegbar.shot.shot_report import report_sections
 
 
 def report(
@@ -28,8 +24,16 @@ def report(
     shot
         The shot file.
     """
+    from pegbar.io import atomic
+    from pegbar.report.page import html_page
+    from pegbar.shot.plan import open_shot
+    from pegbar.shot.shot_report import has_results, report_sections
+
     found = open_shot(shot, aligned=False)
     sections = report_sections(found)
+    if not has_results(sections):
+        first = "pegbar align, secondary, lift, depth or composite"
+        print(f"pegbar: note: no stage of this shot has run yet: run {first} first", file=sys.stderr)
     page = output or found.folder / "report.html"
     name = found.settings.shot.name or shot.stem
     lead = f"What pegbar has found and made for {shot.name}. Stages that have not run are left out."

@@ -8,14 +8,28 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from cyclopts import Parameter
 
 from pegbar.cli.batch import BatchOptions, progress, run_stage
-from pegbar.errors import SimulationError
-from pegbar.shot.secondary_stage import SecondaryStage
+from pegbar.errors import BlenderError, SimulationError
+from pegbar.io.hold import hold
+
+if TYPE_CHECKING:
+    from pegbar.shot.passes_stage import ElementsStage
+    from pegbar.shot.secondary_stage import SecondaryStage
+
+_Program = Literal["pegbar", "blender"]
 
 
-def secondary(shot: Path, options: BatchOptions | None = None) -> int:
+def secondary(
+    shot: Path,
+    options: BatchOptions | None = None,
+    *,
+    engine: Annotated[_Program | None, Parameter(help="What simulates (default: the shot file's).")] = None,
+    renderer: Annotated[_Program | None, Parameter(help="What renders (default: the shot file's).")] = None,
+) -> int:
     """Add simulated secondary motion to a shot; see `pegbar secondary --help`.
 
     Parameters
@@ -23,10 +37,20 @@ def secondary(shot: Path, options: BatchOptions | None = None) -> int:
     shot
         The shot file.
     """
+    from pegbar.shot.secondary_stage import SecondaryStage
+
     options = options or BatchOptions()
-    with _bars() as tell:
-        stage = SecondaryStage(shot, options.overwrite, tell)
-        options.select(stage.secondary.stages[0].bare.frames)
+    stage = SecondaryStage(shot, options.overwrite, engine=engine, renderer=renderer)
+    options.select(stage.secondary.stages[0].bare.frames)
+    # Wrong settings are told before anything is made, also the folder.
+    stage.secondary.check()
+    with hold(stage.secondary.folder):
+        return _run(stage, options)
+
+
+def _run(stage: SecondaryStage, options: BatchOptions) -> int:
+    with bars() as tell:
+        stage.progress = tell
         drivings = stage.drive()
         for note in dict.fromkeys(stage.notes):
             print(f"pegbar: note: {note}", file=sys.stderr)
@@ -35,11 +59,13 @@ def secondary(shot: Path, options: BatchOptions | None = None) -> int:
         print(f"volumes: {_made(stage, 'volumes')}, in {os.path.relpath(stage.secondary.folder)}")
         try:
             scene = stage.simulate(drivings)
-        except SimulationError as error:
+        except (SimulationError, BlenderError) as error:
             print(f"pegbar: {error}; what was made before is kept", file=sys.stderr)
             return 1
     print(f"simulation: {scene.frames} frames {_made(stage, 'simulation')}")
     frames = stage.frames(drivings, scene)
+    if code := _render(stage, frames, options):
+        return code
     start = time.perf_counter()
     if code := run_stage("composite", frames, options):
         return code
@@ -47,6 +73,20 @@ def secondary(shot: Path, options: BatchOptions | None = None) -> int:
     finals = [frames.outputs(frame)[0] for frame in options.select(frames.shot.frames)]
     report = stage.finish(scene, drivings, finals)
     _summarise(stage, report)
+    return 0
+
+
+def _render(stage: SecondaryStage, frames: ElementsStage, options: BatchOptions) -> int:
+    """Have Blender render, where it is to; return the exit code."""
+    try:
+        with bars() as tell:
+            stage.progress = tell
+            stage.render(frames, options.select(frames.shot.frames))
+    except BlenderError as error:
+        print(f"pegbar: {error}; what was made before is kept", file=sys.stderr)
+        return 1
+    if "Blender" in stage.made:
+        print(f"Blender: elements {_made(stage, 'Blender')}, in {os.path.relpath(stage.secondary.folder / 'blender')}")
     return 0
 
 
@@ -67,7 +107,7 @@ def _summarise(stage: SecondaryStage, report: dict[str, Any]) -> None:
 
 
 @contextmanager
-def _bars() -> Iterator[Callable[[str, int, int], None]]:
+def bars() -> Iterator[Callable[[str, int, int], None]]:
     """Give a function that shows a stage's progress: a bar a stage, one after the other."""
     with ExitStack() as stack:
         shown: dict[str, tuple[ExitStack, Callable[[], None]]] = {}

@@ -69,7 +69,7 @@ def rig(motion: Motion) -> Rig:
         (*motion.names, *(f"{motion.names[a]}_{motion.names[b]}_capsule" for a, b in zip(starts, tails, strict=True))),
         (*motion.parents, *starts),
         np.concatenate([translations, np.zeros_like(offsets)], axis=1),
-        _steady(np.concatenate([quaternions, _towards(offsets)], axis=1)),
+        steady(np.concatenate([quaternions, _towards(offsets)], axis=1)),
         scales,
         np.concatenate([(parents < 0) | (spread > _STRETCH), np.zeros(extra, bool)]),
         np.arange(joints + extra) >= joints,
@@ -90,6 +90,13 @@ def frame_seconds(motion: Motion, times: ArrayLike | None) -> Floats:
     if (np.diff(seconds) <= 0).any() or (seconds < 0).any():
         raise ValueError("times: want seconds from 0 on that rise from frame to frame")
     return seconds
+
+
+def steady(quaternions: Floats) -> Floats:
+    """Return the same rotations (F, K, 4) with each quaternion in the half sphere of the one before."""
+    turned = np.einsum("fkq,fkq->fk", quaternions[1:], quaternions[:-1]) < 0
+    signs = np.where(np.cumsum(turned, axis=0) % 2 == 1, -1.0, 1.0)
+    return np.concatenate([quaternions[:1], quaternions[1:] * signs[..., None]])
 
 
 def _local(motion: Motion, parents: NDArray[np.intp]) -> tuple[Floats, Floats]:
@@ -113,13 +120,6 @@ def _quaternions(turns: Floats) -> Floats:
         return np.zeros((*turns.shape[:2], 4))
     flat: Floats = Rotation.from_matrix(turns.reshape(-1, 3, 3)).as_quat()
     return flat.reshape(*turns.shape[:2], 4)
-
-
-def _steady(quaternions: Floats) -> Floats:
-    """The same rotations with each quaternion in the half sphere of the one before."""
-    turned = np.einsum("fkq,fkq->fk", quaternions[1:], quaternions[:-1]) < 0
-    signs = np.where(np.cumsum(turned, axis=0) % 2 == 1, -1.0, 1.0)
-    return np.concatenate([quaternions[:1], quaternions[1:] * signs[..., None]])
 
 
 def _bind_places(parents: NDArray[np.intp], offsets: Floats) -> Floats:

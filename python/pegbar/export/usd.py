@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -87,15 +88,21 @@ def _samples(
     return codes, rows
 
 
-def _paths(bones: Rig) -> list[str]:
-    """The joints' paths: parents first, names that USD allows, each once."""
-    names: list[str] = []
-    for name in bones.names:
+def plain_names(names: Iterable[str]) -> list[str]:
+    """Return ``names`` with the letters that USD allows, each once."""
+    found: list[str] = []
+    for name in names:
         plain = re.sub(r"\W", "_", name, flags=re.ASCII)
         plain = f"_{plain}" if not plain or plain[0].isdigit() else plain
-        while plain in names:
+        while plain in found:
             plain += "_"
-        names.append(plain)
+        found.append(plain)
+    return found
+
+
+def _paths(bones: Rig) -> list[str]:
+    """The joints' paths, parents first."""
+    names = plain_names(bones.names)
     paths = []
     for joint in range(len(names)):
         path, above = names[joint], bones.parents[joint]

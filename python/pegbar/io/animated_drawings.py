@@ -66,7 +66,7 @@ def parse(path: _Path, content: str) -> Drawing:
 
 def _drawing(folder: Path, value: Any) -> Drawing:
     if not isinstance(value, dict) or not {"width", "height", "skeleton"} <= value.keys():
-        raise Misplaced((), "want a character with width, height and skeleton")
+        raise Misplaced((), "no annotations: want a character with width, height and skeleton, or JSON with markers")
     size = tuple(whole(value[side], (side,), low=1, high=1 << 20) for side in ("width", "height"))
     joints, parents = _joints(value["skeleton"])
     points = {_RENAMED.get(name, name): point for name, point in joints.items() if name != "root"}

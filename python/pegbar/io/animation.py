@@ -7,18 +7,14 @@ import math
 import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
 
-import cv2
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from pegbar import arrays
-from pegbar.io import atomic
 from pegbar.io.apng import write_apng
 from pegbar.io.gif import write_gif
+from pegbar.io.webp import write_webp
 
 _SUFFIXES = (".png", ".apng", ".webp", ".gif")
-_TO_BGRA = {3: cv2.COLOR_RGB2BGRA, 4: cv2.COLOR_RGBA2BGRA}
 
 
 def write_animation(path: str | os.PathLike[str], frames: Iterable[ArrayLike], frame_rate: float) -> None:
@@ -29,7 +25,7 @@ def write_animation(path: str | os.PathLike[str], frames: Iterable[ArrayLike], f
     path : path
         .png or .apng (APNG, exact), .webp (lossless) or .gif (256 colours, alpha on or off).
     frames : iterable of (H, W, 3|4) uint8
-        RGB or straight RGBA pictures of one size, taken as they come; all are held in memory for a WebP.
+        RGB or straight RGBA pictures of one size, taken as they come.
     frame_rate : float
         Frames a second. Times are whole milliseconds (GIF: hundredths) and do not drift.
 
@@ -51,21 +47,7 @@ def write_animation(path: str | os.PathLike[str], frames: Iterable[ArrayLike], f
     if suffix in (".png", ".apng"):
         write_apng(path, frames, _durations(frame_rate, 1))
         return
-    pictures: list[NDArray[Any]] = []
-    for index, frame in enumerate(frames):
-        picture = arrays.image(f"frames[{index}]", frame)
-        if pictures:
-            arrays.same_size(f"frames[{index}]", picture, "the first frame", pictures[0].shape)
-        pictures.append(cv2.cvtColor(picture, _TO_BGRA[picture.shape[2]]))
-    if not pictures:
-        raise ValueError("frames: want at least one")
-    animation = cv2.Animation()
-    animation.frames = pictures
-    animation.durations = list(itertools.islice(_durations(frame_rate, 1), len(pictures)))
-    good, encoded = cv2.imencodeanimation(".webp", animation, [cv2.IMWRITE_WEBP_QUALITY, 101])
-    if not good:
-        raise ValueError(f"frames: OpenCV cannot write {len(pictures)} pictures of {pictures[0].shape} as {suffix}")
-    atomic.write_bytes(path, encoded.data)
+    write_webp(path, frames, _durations(frame_rate, 1))
 
 
 def _durations(frame_rate: float, step: int) -> Iterator[int]:

@@ -6,26 +6,16 @@ import os
 import struct
 import zlib
 from collections.abc import Iterable, Iterator
-from typing import BinaryIO, NamedTuple
+from typing import BinaryIO
 
 import cv2
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from pegbar import arrays
 from pegbar.io import atomic
 from pegbar.io.ahead import map_ahead
+from pegbar.io.patches import Patch, changed_patches
 
-Pixels = NDArray[np.uint8]
 _TO_BGR = {3: cv2.COLOR_RGB2BGR, 4: cv2.COLOR_RGBA2BGRA}
-
-
-class _Patch(NamedTuple):
-    """What changes: ``pixels`` with their corner at column ``left``, row ``top``."""
-
-    left: int
-    top: int
-    pixels: Pixels
 
 
 def write_apng(path: str | os.PathLike[str], frames: Iterable[ArrayLike], durations: Iterable[int]) -> None:
@@ -45,10 +35,10 @@ def write_apng(path: str | os.PathLike[str], frames: Iterable[ArrayLike], durati
         For no frames or frames that differ in size or channels.
     """
     with atomic.complete_file(path) as part, open(part, "wb") as file:
-        _write(file, map_ahead(_encoded, _patches(frames)), iter(durations))
+        _write(file, map_ahead(_encoded, changed_patches(frames)), iter(durations))
 
 
-def _write(file: BinaryIO, encoded: Iterator[tuple[_Patch, bytes]], durations: Iterator[int]) -> None:
+def _write(file: BinaryIO, encoded: Iterator[tuple[Patch, bytes]], durations: Iterator[int]) -> None:
     count = order = place = 0
     for patch, png in encoded:
         chunks = list(_chunks(png))
@@ -75,21 +65,7 @@ def _write(file: BinaryIO, encoded: Iterator[tuple[_Patch, bytes]], durations: I
     file.write(_chunk(b"acTL", struct.pack(">II", count, 0)))
 
 
-def _patches(frames: Iterable[ArrayLike]) -> Iterator[_Patch]:
-    """What is new in each frame; one pixel where nothing is."""
-    before: Pixels | None = None
-    for picture in arrays.images("frames", frames):
-        if before is None:
-            yield _Patch(0, 0, picture)
-        else:
-            changed = (picture != before).any(axis=2)
-            rows, columns = np.flatnonzero(changed.any(axis=1)), np.flatnonzero(changed.any(axis=0))
-            top, bottom, left, right = (rows[0], rows[-1], columns[0], columns[-1]) if len(rows) else (0, 0, 0, 0)
-            yield _Patch(int(left), int(top), picture[top : bottom + 1, left : right + 1])
-        before = picture
-
-
-def _encoded(patch: _Patch) -> tuple[_Patch, bytes]:
+def _encoded(patch: Patch) -> tuple[Patch, bytes]:
     good, data = cv2.imencode(".png", cv2.cvtColor(patch.pixels, _TO_BGR[patch.pixels.shape[2]]))
     assert good
     return patch, data.tobytes()

@@ -77,7 +77,8 @@ def read_clips(
     """
     root = Path(folder)
     if not root.is_dir():
-        raise NotADirectoryError(f"{root}: no such folder")
+        what = "a file, want a folder of clips" if root.exists() else "no such folder"
+        raise NotADirectoryError(f"{root}: {what}")
     paths = sorted(_find(root))
     if not paths:
         raise FileNotFoundError(f"{root}: no {', '.join(KINDS)} file here or below")

@@ -14,12 +14,12 @@ Spec = int | Literal["sparse"] | Sequence[int]
 class Exposure:
     """A map from frame numbers to drawing numbers.
 
-    ``starts`` (rising) are the frames on which a new drawing comes up, ``drawings`` the drawing of each, ``end`` the
-    first frame after the last drawing, or None when it is held for ever.
+    ``starts`` (rising) are the frames on which a new drawing comes up, ``drawings`` the drawing of each or None for
+    none, ``end`` the first frame after the last drawing, or None when it is held for ever.
     """
 
     starts: tuple[int, ...]
-    drawings: tuple[int, ...]
+    drawings: tuple[int | None, ...]
     end: int | None = None
 
     @classmethod
@@ -68,16 +68,35 @@ class Exposure:
         first = 1 if first_frame is None else first_frame
         return cls(tuple(range(first, first + len(spec))), tuple(map(int, spec)), first + len(spec))
 
+    @classmethod
+    def of_cells(cls, cells: Sequence[int | None], first_frame: int = 1) -> Exposure:
+        """Return the exposure of a sheet: the drawing of every frame from ``first_frame`` on, None for none.
+
+        Examples
+        --------
+        >>> list(Exposure.of_cells([1, None, 4, 4]).frames)
+        [1, 3, 4]
+        """
+        _need([cell for cell in cells if cell is not None], "exposure")
+        return cls(tuple(range(first_frame, first_frame + len(cells))), tuple(cells), first_frame + len(cells))
+
     @property
-    def frames(self) -> range:
+    def frames(self) -> Sequence[int]:
         """The frames with a drawing; for a last drawing held for ever, up to its first frame."""
-        return range(self.starts[0], self.starts[-1] + 1 if self.end is None else self.end)
+        every = range(self.starts[0], self.starts[-1] + 1 if self.end is None else self.end)
+        return [frame for frame in every if self._at(frame) is not None] if None in self.drawings else every
 
     def drawing(self, frame: int) -> int:
         """Return the number of the drawing that ``frame`` shows; ValueError before the first and after the last."""
         if frame < self.starts[0] or (self.end is not None and frame >= self.end):
             last = "" if self.end is None else self.end - 1
             raise ValueError(f"frame {frame}: has no drawing, the drawings cover {self.starts[0]}-{last}")
+        shown = self._at(frame)
+        if shown is None:
+            raise ValueError(f"frame {frame}: the exposure sheet shows no drawing there")
+        return shown
+
+    def _at(self, frame: int) -> int | None:
         return self.drawings[bisect_right(self.starts, frame) - 1]
 
 

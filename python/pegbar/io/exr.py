@@ -18,13 +18,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from pegbar.errors import FormatError
 from pegbar.io import atomic, exr_channels, exr_header
+from pegbar.io.exr_planes import stored_planes
 
 Floats = NDArray[np.float32]
 _Path = str | os.PathLike[str]
 
 #: Depths from here on are background: Blender writes 1e10.
 BACKGROUND_DEPTH = 1e9
-_HALF_MAX = 65504.0
 _COMPRESSIONS = ("none", "rle", "zips", "zip", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab")
 
 
@@ -126,6 +126,7 @@ def write_exr(
     *,
     compression: str = "zip",
     window: tuple[int, int, int, int] | None = None,
+    exact: bool = False,
 ) -> None:
     """Write an EXR file, complete or not at all.
 
@@ -141,6 +142,8 @@ def write_exr(
         none, rle, zips, zip, piz, pxr24, b44, b44a, dwaa or dwab.
     window : (left, top, right, bottom), optional
         First and last column and row of what is stored (the data window); outside there is nothing when it is read.
+    exact : bool
+        Store every channel in the type it has: half, float or uint32.
 
     Raises
     ------
@@ -162,7 +165,7 @@ def write_exr(
     # To memory first: the library's own file writing loses the reason of a failure.
     stream = io.BytesIO()
     try:
-        with OpenEXR.File(header, _split(channels), num_threads=0) as file:
+        with OpenEXR.File(header, stored_planes(channels, exact=exact), num_threads=0) as file:
             file.write(stream)
     except (RuntimeError, TypeError) as error:
         raise OSError(errno.EIO, f"OpenEXR cannot encode the channels: {error}", os.fspath(path)) from error
@@ -178,49 +181,6 @@ def _cut(channels: Mapping[str, ArrayLike], window: tuple[int, int, int, int]) -
     if not (0 <= left <= right < width and 0 <= top <= bottom < height):
         raise ValueError(f"window: want a part of {width} x {height} pixels, got {window}")
     return min(sizes), {n: np.asarray(value)[top : bottom + 1, left : right + 1] for n, value in channels.items()}
-
-
-def _split(channels: Mapping[str, ArrayLike]) -> dict[str, NDArray[Any]]:
-    """One contiguous plane a channel, in the type it is stored as."""
-    planes: dict[str, NDArray[Any]] = {}
-    for name, value in channels.items():
-        array = np.asarray(value)
-        if array.dtype.kind not in "fiu":
-            raise ValueError(f"channels: {name!r}: want real numbers, got dtype {array.dtype}")
-        if array.ndim == 3 and array.shape[2] in (3, 4) and array.size:
-            prefix = f"{name}." if name else ""
-            letters = [prefix + letter for letter in "RGBA"[: array.shape[2]]]
-            planes |= zip(letters, _layer_planes(array), strict=True)
-        elif array.ndim == 2 and name:
-            planes[name] = _stored(array, half=name.rpartition(".")[2] in ("R", "G", "B", "A", "Y"))
-        else:
-            raise ValueError(f"channels: {name!r}: want shape (H, W) or (H, W, 3|4), got {array.shape}")
-    if not planes or len({plane.shape for plane in planes.values()}) > 1 or not all(p.size for p in planes.values()):
-        raise ValueError(f"channels: want one size for all, got { {n: p.shape for n, p in planes.items()} }")
-    return planes
-
-
-def _layer_planes(array: NDArray[Any]) -> list[NDArray[Any]]:
-    """The planes of an (H, W, C) picture; converted as a whole, since a plane of it is not contiguous."""
-    import cv2
-
-    if array.dtype == np.uint32:
-        return [np.ascontiguousarray(array[..., index]) for index in range(array.shape[2])]
-    stored = _stored(array, half=True)
-    planes = cv2.split(stored.view(np.int16) if stored.dtype == np.float16 else stored)
-    return [np.asarray(plane).view(stored.dtype) for plane in planes]
-
-
-def _stored(array: NDArray[Any], *, half: bool) -> NDArray[Any]:
-    """As uint32 or half if it is that, as half if it shall be and fits, else as float."""
-    if array.dtype == np.uint32 or array.dtype == np.float16:
-        return np.ascontiguousarray(array)
-    array = np.ascontiguousarray(array, np.float32)
-    if not half or not array.size or max(array.max(), -array.min()) > _HALF_MAX:
-        return array
-    import cv2
-
-    return np.asarray(cv2.convertFp16(array)).view(np.float16).reshape(array.shape)
 
 
 def _read_parts(path: _Path) -> list[tuple[exr_header.Part, dict[str, NDArray[Any]]]]:

@@ -16,6 +16,35 @@ Floats = NDArray[np.float64]
 _RIVAL = 0.5
 
 
+# Fewer pixels of a colour are the rim of a dot, or dirt.
+_SMALLEST = 8
+# Paper, ink and pencil differ less between their channels.
+_VIVID = 100
+
+
+def flat_colors(picture: NDArray[np.uint8]) -> dict[tuple[int, int, int], tuple[int, int]]:
+    """Return the flat vivid colours of ``picture`` (H, W, 3 or 4) uint8, largest first, and a pixel (x, y) of each.
+
+    >>> picture = np.full((9, 9, 3), 255, np.uint8)
+    >>> picture[2:6, 3:7] = (255, 0, 0)
+    >>> flat_colors(picture)
+    {(255, 0, 0): (4, 3)}
+    """
+    opaque = picture[..., 3] == 255 if picture.shape[2] == 4 else np.ones(picture.shape[:2], bool)
+    rows, columns = np.nonzero(opaque)
+    packed = picture[rows, columns, :3].astype(np.int64) @ [65536, 256, 1]
+    values, owner, counts = np.unique(packed, return_inverse=True, return_counts=True)
+    found = {}
+    for index in np.argsort(-counts, kind="stable").tolist():
+        red, green, blue = (int(values[index]) >> shift & 255 for shift in (16, 8, 0))
+        if counts[index] >= _SMALLEST and max(red, green, blue) - min(red, green, blue) > _VIVID:
+            pixels = np.flatnonzero(owner == index)
+            row = rows[pixels[(len(pixels) - 1) // 2]]
+            across = columns[pixels[rows[pixels] == row]]
+            found[red, green, blue] = int(across[(len(across) - 1) // 2]), int(row)
+    return found
+
+
 @dataclass(frozen=True, eq=False)
 class Dots:
     """Dots found in one picture for N colours.

@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 _LEAST = 0.02
 
 
-def bone_weights(puppet: Puppet, *, rounds: int = 2) -> Floats:
+def bone_weights(puppet: Puppet, *, rounds: int = 12) -> Floats:
     """Return the weights (n, B) of the bones at every vertex, each row's sum 1.
 
     A vertex begins with the bones of its triangles, by their areas, and takes ``rounds`` times the mean of itself and

@@ -38,8 +38,8 @@ def drawn_pose(puppet: Puppet) -> Floats:
     The root has the depth of the clip's pose. A bone's depth, from its parent to its child joint, is the clip's times
     ``(p + e) / (q + e)``: p its drawn length, q the projected length of the clip's bone, both in metres at the root's
     distance, e 0.3 of the clip's bone. The less the drawing is like the clip's pose, the more a limb has, instead, the
-    depth that makes it as long as its partner on the other side is drawn, if that is less. Bones that no clip moves lie
-    parallel to the picture.
+    depth that makes it as long as its partner on the other side is drawn, if that is less. No limb is longer than its
+    partner unless it is drawn so. Bones that no clip moves lie parallel to the picture.
 
     Raises
     ------
@@ -57,10 +57,7 @@ def drawn_pose(puppet: Puppet) -> Floats:
     lengths = _lengths(puppet, pose)
     share = (wanted + _SOFTENING * lengths) / np.maximum(np.minimum(flat, lengths) + _SOFTENING * lengths, 1e-12)
     away = np.diff(depths[puppet.bones], axis=1)[:, 0] * np.where(moved_bones(puppet) & (lengths > 0), share, 0.0)
-    trust, limbs = _likeness(puppet), _limb_bones(puppet)
-    partner = np.sqrt(np.maximum(wanted[_partners(puppet)] ** 2 - wanted**2, 0))
-    likely = np.sign(away) * np.minimum(np.abs(away), partner)
-    away = np.where(limbs, trust * away + (1 - trust) * likely, away)
+    away = np.where(_limb_bones(puppet), _limb_depths(puppet, wanted, away), away)
     drawn = np.full(len(pose), depths[root])
     for (parent, child), step in zip(puppet.bones.tolist(), away, strict=True):
         drawn[child] = drawn[parent] + step
@@ -81,6 +78,19 @@ def _bone_markers(puppet: Puppet) -> list[tuple[str | None, str | None]]:
 
 def _limb_bones(puppet: Puppet) -> NDArray[np.bool_]:
     return np.array([(child or "").endswith(LIMB_ENDS) for _, child in _bone_markers(puppet)], bool)
+
+
+def _limb_depths(puppet: Puppet, wanted: Floats, away: Floats) -> Floats:
+    """The depths (B,) of limbs' bones whose drawn lengths are ``wanted`` and whose depths by the clip ``away``."""
+    partners = _partners(puppet)
+    trust, other = _likeness(puppet), wanted[partners]
+    likely = np.minimum(np.abs(away), np.sqrt(np.maximum(other**2 - wanted**2, 0)))
+    deep = trust * np.abs(away) + (1 - trust) * likely
+    # The clip's actor may hold one arm to the camera that is drawn aside: it would be longer than the other.
+    lengths = np.hypot(wanted, deep)
+    most = np.maximum(np.minimum(lengths, lengths[partners]), np.maximum(wanted, other))
+    depths: Floats = np.sign(away) * np.sqrt(np.maximum(np.minimum(lengths, most) ** 2 - wanted**2, 0))
+    return depths
 
 
 def _partners(puppet: Puppet) -> NDArray[np.intp]:

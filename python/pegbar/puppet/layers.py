@@ -17,11 +17,17 @@ from numpy.typing import NDArray
 from pegbar.puppet.limbs import DrawnLimb
 from pegbar.puppet.parts import Parts
 from pegbar.puppet.view import View
+from pegbar.scene.drawn_skeleton import limb_chains
 from pegbar.scene.puppet_input import PuppetInput
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 BODY = "body"
+#: What is thinner than so many of the limbs' half widths, and lies along a limb, is none of the trunk, and nothing that
+#: is hidden is as thin.
+_SLIVER = 0.4
+#: The part of a sliver's rim that touches the limb whose it is.
+_TOUCH = 0.3
 #: How much thinner a hidden limb is taken to be than the limb beside it shows.
 _SLIM = 0.9
 
@@ -122,7 +128,7 @@ def cut_layers(source: PuppetInput, mask: Flags, parts: Parts, plan: LayerPlan) 
     layers, before_it = [], np.zeros_like(mask)
     drawn = _drawn(source, mask, parts, plan)
     for name, bones, joint, own in zip(plan.names, plan.bones, plan.joints, drawn, strict=True):
-        hidden = _expected(source, parts, bones) & before_it & ~own
+        hidden = _opened(own | (_expected(source, parts, bones) & before_it), _sliver(source, parts)) & before_it & ~own
         region = _joined(own | hidden, source, bones)
         parent = -1 if joint < 0 else plan.names.index(BODY)
         layers.append(Layer(name, bones, own & region, region, joint, parent))
@@ -136,6 +142,7 @@ def _drawn(source: PuppetInput, mask: Flags, parts: Parts, plan: LayerPlan) -> l
     body = plan.names.index(BODY)
     if source.segmentation is None:
         _claim(source, parts, plan, drawn)
+        give_slivers(drawn, body, _sliver(source, parts))
     for index, (joint, bones) in enumerate(zip(plan.joints, plan.bones, strict=True)):
         held = _capsules(source, bones, np.ones(len(source.bones)), mask)
         pieces = _joined(drawn[index] | held, source, bones)
@@ -164,6 +171,32 @@ def _claim(source: PuppetInput, parts: Parts, plan: LayerPlan, drawn: list[Flags
             taken = drawn[farther] & own
             drawn[index] |= taken
             drawn[farther] &= ~taken
+
+
+def give_slivers(drawn: list[Flags], body: int, width: float) -> None:
+    """Give limbs, in place, what thin pieces of the body's layer lie along them: their outlines, and what is beside."""
+    count, pieces = cv2.connectedComponents((drawn[body] & ~_opened(drawn[body], width)).view(np.uint8), connectivity=4)
+    cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
+    for piece in range(1, count):
+        own = pieces == piece
+        rim = cv2.dilate(own.view(np.uint8), cross).astype(bool) & ~own
+        touches = [0 if index == body else int((rim & other).sum()) for index, other in enumerate(drawn)]
+        if max(touches) > _TOUCH * rim.sum():
+            drawn[int(np.argmax(touches))] |= own
+            drawn[body] &= ~own
+
+
+def _sliver(source: PuppetInput, parts: Parts) -> float:
+    """How thin a sliver is, in pixels."""
+    limbs = [bone for chain in limb_chains(source.names, source.bones) for bone in chain]
+    return _SLIVER * float(np.median(parts.radii[limbs or slice(None)]))
+
+
+def _opened(region: Flags, width: float) -> Flags:
+    """What of a region a disc of this width reaches (morphological opening)."""
+    size = 2 * (round(width) // 2) + 1
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
+    return np.asarray(cv2.morphologyEx(region.view(np.uint8), cv2.MORPH_OPEN, disc), bool)
 
 
 def _expected(source: PuppetInput, parts: Parts, bones: tuple[int, ...]) -> Flags:

@@ -13,11 +13,13 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from pegbar.puppet.alpha import Matting, figure_alpha
 from pegbar.puppet.check import Pieces, checked
 from pegbar.puppet.inpaint import Completion, Method, complete
 from pegbar.puppet.layers import LayerPlan, cut_layers, plan_layers
+from pegbar.puppet.limb_ends import unsure_notes
 from pegbar.puppet.limbs import drawn_limbs
 from pegbar.puppet.mesh import layered_mesh, mesh_spacing
 from pegbar.puppet.parts import Parts, grow_parts
@@ -33,6 +35,8 @@ from pegbar.scene.puppet_input import PuppetInput
 _RIM = 0.3
 #: So many half widths of a limb around the figure the background is completed too: shadows and soft edges.
 _MARGIN = 0.35
+#: At feet, so many half widths around the joint, it is completed farther: they throw shadows, and soles are lost.
+_FOOT, _SHADOW = 4.0, 1.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,17 +111,18 @@ def prepare_figure(
     if source.bone_map is not None:
         return source
     image = np.ascontiguousarray(source.image[..., :3])
-    soft = matting != "auto"
+    soft, photo = matting != "auto", False
     if source.mask is None:
         mask, on_paper = find_silhouette(source, view)
-        source = dataclasses.replace(source, mask=mask)
-        soft = soft or not on_paper
+        source, photo = dataclasses.replace(source, mask=mask), not on_paper
     figure = checked(source, pieces=pieces)
     whole = figure.mask
     assert whole is not None
-    if soft:
+    if soft or photo:
         figure = dataclasses.replace(figure, alpha=figure_alpha(image, whole, matting))
     parts = grow_parts(figure, whole)
+    if photo:
+        figure = dataclasses.replace(figure, notes=(*figure.notes, *unsure_notes(figure, parts)))
     return dataclasses.replace(figure, bone_map=parts.bones, radii=parts.radii)
 
 
@@ -152,8 +157,7 @@ def build_puppet(
     thick = _limb_radius(figure, parts)
     behind = None
     if background and (figure.image.shape[2] == 3 or figure.image[..., 3].min() >= 128):
-        size = 2 * max(1, round(_MARGIN * thick)) + 1
-        hole = cv2.dilate((figure.alpha > 0).view(np.uint8), np.ones((size, size), np.uint8)).astype(bool)
+        hole = _hole(figure, thick)
         behind = complete(image, hole, completion) if not hole.all() else None
     return Puppet(
         names=figure.names,
@@ -196,6 +200,20 @@ def _parts(figure: PuppetInput) -> Parts:
     assert figure.bone_map is not None
     assert figure.radii is not None
     return Parts(figure.bone_map, figure.radii)
+
+
+def _hole(figure: PuppetInput, thick: float) -> NDArray[np.bool_]:
+    """What of the picture (H, W) is completed where the figure is taken out: a margin more, at the feet a wide one."""
+    assert figure.alpha is not None
+    figures = (figure.alpha > 0).astype(np.uint8)
+    feet = np.zeros_like(figures)
+    for name, mark in zip(figure.names, figure.marks, strict=True):
+        if figure.drives.get(name, "").endswith("_foot"):
+            cv2.circle(feet, np.rint(mark).astype(int).tolist(), round(_FOOT * thick), 1, -1)
+    size, wide = (2 * max(1, round(margin * thick)) + 1 for margin in (_MARGIN, _SHADOW))
+    hole = cv2.dilate(figures, np.ones((size, size), np.uint8))
+    hole |= cv2.dilate(figures & feet, np.ones((wide, wide), np.uint8))
+    return np.asarray(hole, bool)
 
 
 def _limb_radius(figure: PuppetInput, parts: Parts) -> float:

@@ -21,8 +21,8 @@ Flags = NDArray[np.bool_]
 Ints = NDArray[np.int64]
 #: Share of the figure's height in the depth by which an order must be wrong before it changes.
 HYSTERESIS = 0.02
-#: The same by which an arm must be farther (or nearer) than a bone of the body to go behind (or before) it against the
-#: drawing: a body is thick, and an arm that hangs beside it has about the depth of its middle.
+#: The same by which an arm must be farther (or nearer) than a bone of the body or of a leg to go behind (or before) it
+#: against the drawing: they are thick, and an arm that hangs beside them has about the depth of their middle.
 BODY = 0.05
 _ARM_ENDS = ("elbow", "hand", "wrist")
 
@@ -130,9 +130,9 @@ def _crossings(
 
 
 def _leaning(pieces: Pieces, drawn: Flags, first: Ints, second: Ints) -> Floats:
-    """1 where the first of a pair of an arm and a part of the body is drawn in front, -1 where it is behind, else 0."""
-    kinds = np.sort(pieces.kinds[np.stack([first, second])], axis=0)
-    return np.where((kinds[0] == 1) & (kinds[1] == 2), np.where(drawn, 1.0, -1.0), 0.0)
+    """1 where the first of an arm's piece and one of the body or a leg is drawn in front, -1 where behind, else 0."""
+    arms = (pieces.kinds[np.stack([first, second])] == 2).sum(axis=0)
+    return np.where(arms == 1, np.where(drawn, 1.0, -1.0), 0.0)
 
 
 def nearest_points(start: Floats, along: Floats, other: Floats, across: Floats) -> tuple[Floats, Floats, Floats]:
@@ -140,12 +140,12 @@ def nearest_points(start: Floats, along: Floats, other: Floats, across: Floats) 
 
     Where they cross the distance is 0.
     """
-    aa, bb = (along**2).sum(-1) + 1e-12, (across**2).sum(-1) + 1e-12
+    aa, bb = (np.maximum((part**2).sum(-1), 1e-30) for part in (along, across))
     ab = (along * across).sum(-1)
     gap = start - other
     ag, bg = (along * gap).sum(-1), (across * gap).sum(-1)
     determinant = aa * bb - ab * ab
-    share = np.where(determinant > 1e-9 * aa * bb, (ab * bg - ag * bb) / np.maximum(determinant, 1e-300), 0.5)
+    share = np.where(determinant > 1e-14 * aa * bb, (ab * bg - ag * bb) / np.maximum(determinant, 1e-300), 0.5)
     share = np.clip(share, 0, 1)
     partner = np.clip((ab * share + bg) / bb, 0, 1)
     share = np.clip((ab * partner - ag) / aa, 0, 1)

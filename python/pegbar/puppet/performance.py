@@ -12,6 +12,8 @@ from pegbar.puppet.asap import AsapShapes
 from pegbar.puppet.clip_poses import clip_markers, clip_times, continued
 from pegbar.puppet.deform import Deformer
 from pegbar.puppet.drawn_pose import drawn_pose
+from pegbar.puppet.extremities import Extremities
+from pegbar.puppet.feet import STANDS, lock_feet, standing_feet, standing_legs
 from pegbar.puppet.occlusion import Pieces, piece_ranks
 from pegbar.puppet.pose_blend import blend_poses, closed_loop, ease
 from pegbar.puppet.retarget import body_scale, facing_turn, retarget
@@ -41,6 +43,8 @@ class Direction:
         The clip's frames to begin and end with, counted from 0; None: all but an inserted T-pose.
     keep : {"near", "always", "never"}
         How drawn limbs that point otherwise than the clip's are treated (`pegbar.puppet.retarget.retarget`).
+    feet : {"locked", "free"}
+        Whether feet that stand in the clip keep their place on the ground (`pegbar.puppet.feet`).
     travel : {"auto", "in-place", "travelling"}
         Whether the figure goes where the clip goes; "auto" where that is less than a step.
     camera : {"still", "following"}
@@ -61,6 +65,7 @@ class Direction:
     first: int | None = None
     last: int | None = None
     keep: str = "near"
+    feet: str = "locked"
     travel: str = "auto"
     camera: str = "still"
     transition: float = 0.0
@@ -132,8 +137,9 @@ def perform(puppet: Puppet, motion: Motion | Sequence[Motion], direction: Direct
         For joints that are missing throughout the clip, or a figure that walks into the camera.
     """
     direction = direction or Direction()
-    if direction.camera not in CAMERAS or direction.shapes not in SHAPES:
-        raise ValueError(f"direction: want a camera of {', '.join(CAMERAS)} and shapes of {', '.join(SHAPES)}")
+    for name, known in (("camera", CAMERAS), ("shapes", SHAPES), ("feet", STANDS)):
+        if getattr(direction, name) not in known:
+            raise ValueError(f"direction: want {name} of {', '.join(known)}, got {getattr(direction, name)!r}")
     rest = drawn_pose(puppet)
     motions = (motion,) if isinstance(motion, Motion) else tuple(motion)
     poses, way, rate, notes = _joined(puppet, rest, motions, direction)
@@ -162,6 +168,9 @@ def perform(puppet: Puppet, motion: Motion | Sequence[Motion], direction: Direct
 
 def deformed_meshes(puppet: Puppet, rest: Floats, poses: Floats, direction: Direction) -> Floats:
     """Return the mesh (F, n, 2) in ``poses`` (F, J, 3); as drawn it shows the pose ``rest`` (J, 3)."""
+    ends = Extremities.of_puppet(puppet)
+    puppet = ends.puppet
+    rest, poses = ends.extended(rest, poses)
     deformer = Deformer(puppet.vertices, puppet.triangles, puppet.handles)
     asap = AsapShapes.of_puppet(puppet, rest, inflation=direction.inflation)
     # Mesh vertices are not exactly on the bones.
@@ -206,8 +215,7 @@ def _joined(
         markers = clip_markers(puppet, motion, times)
         markers = markers if before is None else continued(puppet, markers, before)
         notes += _turned_notes(puppet, markers, reference, times)
-        own = retarget(puppet, rest, markers, reference, keep=direction.keep)
-        own = ground_poses(own, markers, rest, reference, scale)
+        own = _on_the_ground(puppet, rest, motion, markers, reference, times, rate, direction)
         way = horizontal_path(markers[:, root], reference[root], scale, direction.travel)
         if before is not None:
             way = way - way[0] + ways[-1][-1]
@@ -217,6 +225,36 @@ def _joined(
         ways.append(way)
         before = markers
     return np.concatenate(poses), np.concatenate(ways), rate, tuple(dict.fromkeys(notes))
+
+
+def _on_the_ground(
+    puppet: Puppet,
+    rest: Floats,
+    motion: Motion,
+    markers: Floats,
+    reference: Floats,
+    times: Floats,
+    rate: float,
+    direction: Direction,
+) -> Floats:
+    """The drawn figure (F, J, 3) in a clip's poses, standing on the floor, its root over where it was drawn."""
+    own, scale = retarget(puppet, rest, markers, reference, keep=direction.keep), body_scale(puppet, rest, reference)
+    # With "always" legs are as they are drawn, feet with them.
+    locked = direction.feet == "locked" and direction.keep != "always" and standing_legs(puppet)
+    stands = standing_feet(motion) if locked else None
+    if stands is None:
+        return ground_poses(own, markers, rest, reference, scale)
+    root = root_joint(puppet)
+    return lock_feet(
+        puppet,
+        own,
+        markers,
+        rest,
+        reference,
+        contacts=stands[np.rint(times).astype(int)],
+        path=horizontal_path(markers[:, root], reference[root], scale, "travelling"),
+        frame_rate=rate,
+    )
 
 
 def _between(puppet: Puppet, first: Floats, second: Floats, count: int) -> Floats:

@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
 from pegbar import arrays
@@ -21,9 +22,15 @@ from pegbar.scene.puppet import Puppet
 Floats = NDArray[np.float64]
 
 
-# Degrees by which a limb may be drawn otherwise than in the clip and still be the same pose, and from which on it is
-# another one: a drawing with stretched-out arms does not walk with stretched-out arms.
-_SAME, _OTHER = 30.0, 75.0
+# Degrees by which a limb may be drawn otherwise than in the clip as the figure's build, that shows in all poses; by
+# which it may be and still be the same pose, and from which on it is another one: a drawing with stretched-out arms
+# does not walk with them; and how far the clip's limb may be from that pose for the difference to count, or is where it
+# does not: legs that are drawn closer than the clip's must not cross when it closes them.
+_BUILD, _SAME, _NEAR = (10.0, 20.0), (30.0, 75.0), (5.0, 40.0)
+# A figure that is like no pose of the clip (an animal) is as deep as is guessed: of its limbs so much is seen at least.
+_FLAT = 0.8
+# Frames over which a direction is smoothed that the picture hardly tells, and the seen share up to which it does so.
+_LAG, _STEADY = 3.0, 0.7
 #: How the difference between the drawn limbs and the clip's is treated.
 KEEPS = ("near", "always", "never")
 
@@ -44,8 +51,9 @@ def retarget(
         The same in the clip's pose in which the figure was recognised.
     keep : {"near", "always", "never"}
         What happens to the difference between a drawn limb's direction and the clip's in ``reference``: "near" keeps
-        it up to 30 degrees and lets it go from 75 degrees on, "always" keeps it, "never" follows the clip. The body
-        (spine, head, shoulders, hips) always keeps it. Differences turn with the way the person faces.
+        it up to 10 degrees; while the clip's limb is near its reference up to 30, and less of it from there to 75.
+        "always" keeps it, "never" follows the clip. The body (spine, head, shoulders, hips) always keeps it.
+        Differences turn with the way the person faces.
 
     Raises
     ------
@@ -61,17 +69,30 @@ def retarget(
     before = arrays.floats("reference", reference, (joints, 3), allow="nan")
     _refuse_missing(puppet, clip, moved)
     turns = Rotation.from_euler("y", facing_turn(puppet, clip, before)[:, None], degrees=True)
+    body, trunk = turns, np.zeros(len(moved), bool)
+    if not puppet.fitted:
+        # It is always seen from the drawn side, with its trunk all of a piece.
+        clip, turns = _turned(clip, turns.inv()), Rotation.identity()
+        trunk = moved & _trunk_bones(puppet)
+        body = _tilt(_trunk_turns(clip, before, np.unique(puppet.bones[trunk])), puppet.camera.rotation[2])
     result = np.zeros(clip.shape)
     root = int(np.flatnonzero(puppet.parents < 0)[0])
     result[:, root] = rest[root]
-    rotations: dict[int, Rotation] = {root: turns}
-    for (parent, child), is_moved in zip(puppet.bones.tolist(), moved, strict=True):
+    rotations: dict[int, Rotation] = {root: body}
+    for (parent, child), is_moved, is_trunk in zip(puppet.bones.tolist(), moved, trunk, strict=True):
         own = rest[child] - rest[parent]
-        if is_moved:
+        if is_trunk:
+            rotations[child] = body
+            along = body.apply(own)
+        elif is_moved:
             seen = _unit(before[child] - before[parent])
-            offset = _kept(_rotations_between(seen, _unit(own)[None])[0], keep, puppet.drives[puppet.names[child]])
-            directions = (turns * offset * turns.inv()).apply(_unit(clip[:, child] - clip[:, parent]))
-            rotations[child] = _rotations_between(_unit(own), directions)
+            offset = rotations_between(seen, _unit(own)[None])[0]
+            directions = turns.inv().apply(_unit(clip[:, child] - clip[:, parent]))
+            shares = _kept(offset, directions @ seen, keep, puppet.drives[puppet.names[child]])
+            directions = (turns * Rotation.from_rotvec(shares[:, None] * offset.as_rotvec())).apply(directions)
+            if not puppet.fitted:
+                directions = towards_picture(directions, puppet.camera.rotation, _FLAT)
+            rotations[child] = rotations_between(_unit(own), directions)
             along = directions * np.linalg.norm(own)
         else:
             rotations[child] = rotations[parent]
@@ -104,18 +125,86 @@ def facing_turn(puppet: Puppet, clip: Floats, reference: Floats) -> Floats:
     return np.nan_to_num(turned - 360 * np.round(known[0] / 360)) if len(known) else np.zeros(len(clip))
 
 
-def _kept(offset: Rotation, keep: str, marker: str) -> Rotation:
-    """The part of ``offset`` that stays."""
+def towards_picture(along: Floats, axes: Floats, least: float) -> Floats:
+    """Vectors (F, 3) turned back towards the picture, so that ``least`` of their length is seen at least.
+
+    ``axes`` (3, 3) are the camera's: right, down and forward.
+    """
+    right, down, deep = (along @ axes.T).T
+    length = np.linalg.norm(along, axis=1)
+    seen = np.hypot(right, down) / length
+    # The outline of an ellipsoid of half axes 1 and r that is seen from an angle.
+    wanted = np.sqrt(seen**2 + least**2 * (1 - seen**2))
+    angles = _steady(np.arctan2(down, right), seen)
+    towards = np.sign(deep) * np.sqrt(np.maximum(1 - wanted**2, 0))
+    shown = np.stack([wanted * np.cos(angles), wanted * np.sin(angles), towards], axis=1)
+    result: Floats = length[:, None] * (shown @ axes)
+    return result
+
+
+def _steady(angles: Floats, seen: Floats) -> Floats:
+    """Angles (F,) in radians, smoothed where what they are the direction of is hardly seen: ``seen`` (F,), 0 to 1."""
+    turned = np.unwrap(angles)
+    weights = seen + 1e-3
+    smooth = gaussian_filter1d(weights * turned, _LAG, mode="nearest") / gaussian_filter1d(
+        weights, _LAG, mode="nearest"
+    )
+    share = np.clip(seen / _STEADY, 0, 1)
+    share = share * share * (3 - 2 * share)
+    steady: Floats = share * turned + (1 - share) * smooth
+    return steady
+
+
+def _trunk_bones(puppet: Puppet) -> NDArray[np.bool_]:
+    """Which bones (B,) are the trunk's: those of no limb, and not the head's."""
+    ends = [puppet.drives.get(puppet.names[child]) or "" for child in puppet.bones[:, 1].tolist()]
+    return np.array([not end.endswith((*LIMB_ENDS, "head")) for end in ends], bool)
+
+
+def _turned(points: Floats, turns: Rotation) -> Floats:
+    """Points (F, J, 3), each frame's turned by its rotation; NaN stays."""
+    turned: Floats = np.einsum("fij,fnj->fni", turns.as_matrix(), points)
+    return turned
+
+
+def _tilt(turns: Rotation, axis: Floats) -> Rotation:
+    """The part of rotations (F,) that goes round a unit ``axis`` (3,): their twist."""
+    quaternions = turns.as_quat()
+    return Rotation.from_rotvec(2 * np.arctan2(quaternions[:, :3] @ axis, quaternions[:, 3])[:, None] * axis)
+
+
+def _trunk_turns(clip: Floats, before: Floats, joints: NDArray[np.int64]) -> Rotation:
+    """How the markers ``joints`` have turned as one body (F,) from ``before`` (J, 3) to ``clip`` (F, J, 3)."""
+    then, now = before[joints], clip[:, joints]
+    if not len(joints):
+        return Rotation.identity(len(clip))
+    spread = np.einsum("fki,kj->fij", now - now.mean(axis=1, keepdims=True), then - then.mean(axis=0))
+    left, _, right = np.linalg.svd(spread)
+    # The nearest rotation to the spread; not a mirror image.
+    left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
+    return Rotation.from_matrix(left @ right)
+
+
+def _kept(offset: Rotation, alike: Floats, keep: str, marker: str) -> Floats:
+    """The part (F,) of ``offset`` that stays where a bone's direction has the cosines ``alike`` (F,) to the drawn."""
     if keep == "always" or not marker.endswith(LIMB_ENDS):
-        return offset
+        return np.ones(len(alike))
     if keep == "never":
-        return Rotation.identity()
+        return np.zeros(len(alike))
+    away = np.degrees(np.arccos(np.clip(alike, -1, 1)))
     angle = math.degrees(offset.magnitude())
-    share = np.clip((_OTHER - angle) / (_OTHER - _SAME), 0, 1)
-    return offset ** float(share * share * (3 - 2 * share))
+    build = _fading(angle, *_BUILD)
+    return build + (_fading(angle, *_SAME) - build) * _fading(away, *_NEAR)
 
 
-def _rotations_between(first: Floats, second: Floats) -> Rotation:
+def _fading(angle: Floats | float, start: float, end: float) -> Floats:
+    """1 up to ``start``, 0 from ``end`` on, smoothly."""
+    share = np.clip((end - np.asarray(angle)) / (end - start), 0, 1)
+    smooth: Floats = share * share * (3 - 2 * share)
+    return smooth
+
+
+def rotations_between(first: Floats, second: Floats) -> Rotation:
     """The smallest rotations that take unit vector ``first`` (3,) to each of ``second`` (F, 3)."""
     axis = np.cross(first, second)
     cosine = second @ first

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pegbar.errors import DegenerateError
+from pegbar.puppet.limb_ends import cut_ends
 from pegbar.puppet.parts import bone_distances
 from pegbar.puppet.template import covered, fit_template, person_template
 from pegbar.puppet.view import View, drawn_view
@@ -105,7 +106,7 @@ def person_mask(source: PuppetInput, view: View | None = None) -> Flags:
     cv2.grabCut(part, labels, None, *models, _ROUNDS, cv2.GC_INIT_WITH_MASK)
     mask = np.zeros(seeds.shape, bool)
     mask[window] = np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD))
-    return _tidied(mask, source, trunk)
+    return cut_ends(source, _tidied(mask, source, trunk), seeds, likely, trunk, _REACH * trunk)
 
 
 def _seeds(source: PuppetInput, likely: Flags, trunk: float) -> Labels:

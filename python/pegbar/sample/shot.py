@@ -22,6 +22,7 @@ from pegbar.sample import drawing as painter
 from pegbar.sample.annotation import annotate, seen
 from pegbar.sample.camera import camera
 from pegbar.sample.dancer import FRAME_RATE, FRAMES, Dance, dance
+from pegbar.sample.dots import dots_layer, dots_shot
 from pegbar.sample.elements import hoop, ribbon
 from pegbar.sample.figure import PALETTE, Pose
 from pegbar.sample.skeleton import NAMES
@@ -118,9 +119,10 @@ def write_sample(
     """Make the sample shot in ``folder`` and return the path of its shot file.
 
     Written are ``drawings/``, ``labels/`` and ``passes/`` (numbered from 1), ``annotation.json`` (markers, limbs,
-    boxes, cameras and depths), ``clip.bvh`` (the dance with bones of constant length), ``truth.npz`` and
-    ``shot.toml``. ``truth.npz`` holds ``names`` (N,), ``clip`` and ``drawn`` (F, N, 3) world metres without and with
-    squash and stretch, ``matrices`` (F, 3, 4) and ``image_size`` (2,).
+    boxes, cameras and depths), ``clip.bvh`` (the dance with bones of constant length), ``truth.npz`` and ``shot.toml``;
+    and ``dots/`` with ``dots.toml``, the same joints as a layer of coloured dots. ``truth.npz`` holds ``names`` (N,),
+    ``clip`` and ``drawn`` (F, N, 3) world metres without and with squash and stretch, ``matrices`` (F, 3, 4) and
+    ``image_size`` (2,).
 
     Parameters
     ----------
@@ -149,7 +151,7 @@ def write_sample(
         arrays.integers(name, value, (), low=1, high=9999)
     target = Path(folder)
     scene = make_scene((width, height), frames)
-    for name in ("drawings", "labels", "passes"):
+    for name in ("drawings", "labels", "dots", "passes"):
         (target / name).mkdir(parents=True, exist_ok=True)
     visible = np.empty((frames, len(NAMES)), bool)
     with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
@@ -165,6 +167,7 @@ def write_sample(
     palette = "\n".join(f'"#{red:02x}{green:02x}{blue:02x}" = "{limb}"' for (red, green, blue), limb in PALETTE.items())
     text = _SHOT.format(frames=frames, rate=FRAME_RATE, width=width, height=height, palette=palette)
     atomic.write_bytes(target / "shot.toml", text.encode())
+    atomic.write_bytes(target / "dots.toml", dots_shot(frames, FRAME_RATE, (width, height)).encode())
     return target / "shot.toml"
 
 
@@ -177,6 +180,8 @@ def _write_frame(folder: Path, index: int, scene: Scene, samples: int) -> NDArra
     frame, number = make_frame(index, scene, samples), f"{index + 1:04d}"
     write_image(folder / f"drawings/dancer.{number}.png", frame.drawing)
     write_image(folder / f"labels/labels.{number}.png", frame.labels)
+    marks = scene.cameras[index].project(scene.pose(index).markers)
+    write_image(folder / f"dots/dots.{number}.png", dots_layer(marks, frame.visible, scene.size))
     write_exr(folder / f"passes/passes.{number}.exr", {"": frame.passes.beauty, "Z": frame.passes.depth})
     return frame.visible
 

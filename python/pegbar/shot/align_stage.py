@@ -16,11 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pegbar.errors import DegenerateError, ShotError
+from pegbar.errors import DegenerateError, FormatError, ShotError, describe
 from pegbar.io import atomic
 from pegbar.io.alignment import read_alignment, write_alignment
 from pegbar.io.annotations_writer import write_annotations
 from pegbar.io.frames import read_picture, write_image
+from pegbar.io.hold import hold
 from pegbar.report.align_overlay import align_overlay
 from pegbar.report.contact_sheet import contact_sheet, over_paper
 from pegbar.report.warp_plot import warp_picture
@@ -28,9 +29,9 @@ from pegbar.scene.alignment import Alignment
 from pegbar.scene.drawing import Drawing
 from pegbar.shot.alignment import AlignOptions, align_drawing
 from pegbar.shot.clip_choice import Choice, choose_clip
-from pegbar.shot.marks import ALIGNED
+from pegbar.shot.marks import ALIGNED, outside_warnings
 from pegbar.shot.plan import Shot
-from pegbar.shot.record import fingerprint, is_up_to_date, write_record
+from pegbar.shot.record import fingerprint, forget, is_up_to_date, write_record
 from pegbar.shot.registered import CameraOptions, Retiming
 
 VERSION = 5
@@ -71,16 +72,24 @@ class AlignStage:
         ShotError
             For a shot without marks or clip.
         ValueError, OSError
-            For a clip that cannot be read or does not fit, and marks that determine nothing.
+            For a clip that cannot be read or does not fit, and marks that determine nothing; BusyError where another
+            run is aligning the shot.
         """
         self._check()
         drawing, holds = self.drawing(), self.holds()
         if self.is_done():
             return read_alignment(self.outputs()[0]), False
-        rate = self.shot.settings.shot.frame_rate
         self._check_marks(drawing)
-        assert self.shot.settings.clip is not None
-        choice = choose_clip(self.shot.settings.clip, self.shot.folder, drawing, holds, rate)
+        with hold(self.folder):
+            return self._align(drawing, holds, progress), True
+
+    def _align(
+        self, drawing: Drawing, holds: NDArray[np.float64], progress: Callable[[int, int], None] | None
+    ) -> Alignment:
+        rate = self.shot.settings.shot.frame_rate
+        # What is changed while this works is out of date afterwards.
+        prints = [fingerprint(path) for path in self._inputs() if path.is_file()]
+        choice = self._choice(drawing, holds, rate)
         alignment, retiming = align_drawing(drawing, choice.motion, choice.view, holds, rate, self._options())
         alignment = dataclasses.replace(
             alignment,
@@ -88,12 +97,12 @@ class AlignStage:
             mirrored=choice.view.mirrored,
             swapped=choice.view.swapped,
             notes=(*choice.notes, *alignment.notes),
-            warnings=(*choice.warnings, *alignment.warnings),
+            warnings=(*choice.warnings, *alignment.warnings, *self._outside()),
         )
-        self.folder.mkdir(parents=True, exist_ok=True)
+        forget(self.outputs())
         self._write(drawing, choice, alignment, retiming, progress)
-        write_record(self.outputs(), self._recipe(), [fingerprint(path) for path in self._inputs()])
-        return alignment, True
+        write_record(self.outputs(), self._recipe(), prints)
+        return alignment
 
     def is_done(self) -> bool:
         """Whether the results stand and nothing that they depend on has changed."""
@@ -148,6 +157,21 @@ class AlignStage:
                 joints = ", ".join(name for name, there in zip(drawing.names, row, strict=True) if there) or "none"
                 name = self.shot.settings.drawing.annotations
                 raise DegenerateError(f"{name}: drawing {number}: too few visible marks ({joints}), want 4 or more")
+
+    def _choice(self, drawing: Drawing, holds: NDArray[np.float64], rate: float) -> Choice:
+        """The shot's clip; ShotError, with its place in the shot file, for files that cannot be read."""
+        section = self.shot.settings.clip
+        assert section is not None
+        try:
+            return choose_clip(section, self.shot.folder, drawing, holds, rate)
+        except (FormatError, OSError) as error:
+            key = "clip.path" if section.path is not None else "clip.folder"
+            raise ShotError([f"{self.shot.place(key)}: {key}: {describe(error)}"]) from error
+
+    def _outside(self) -> list[str]:
+        marks = self.shot.annotations
+        assert marks is not None
+        return outside_warnings(marks, {number: self.shot.marks[number] for number in self.numbers})
 
     def _options(self) -> AlignOptions:
         section = self.shot.settings.align

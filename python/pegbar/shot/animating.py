@@ -112,8 +112,15 @@ def animate_parts(
     ready = time.perf_counter()
     pictures = map_ahead(stage.picture, range(len(stage)))
     write_film(output, _told(pictures, len(stage), progress), performances[0].frame_rate, alpha=alpha)
-    notes = tuple(dict.fromkeys(note for made in performances for note in (*made.puppet.notes, *made.notes)))
+    notes = tuple(dict.fromkeys(_told_by(parts, performances)))
     return Outcome(output, ready - start, time.perf_counter() - start, len(stage), notes)
+
+
+def _told_by(parts: Sequence[Part], performances: Sequence[Performance]) -> Iterator[str]:
+    """What a user should know; of several figures with the figure's name."""
+    for part, made in zip(parts, performances, strict=True):
+        name = f"{picture_name(part.picture)}: " if len(parts) > 1 else ""
+        yield from (name + note for note in (*made.puppet.notes, *made.notes))
 
 
 def cast(part: Part, casting: Casting, direction: Direction, setting: Setting) -> Performance:

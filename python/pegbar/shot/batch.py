@@ -1,8 +1,12 @@
 """Runs one task over many frames, in worker processes, with bounded memory.
 
 Each worker holds one frame at a time and talks through a pipe of its own, so that it ends by itself when the parent
-is killed, and the parent notices a worker that dies. Processes, not threads: a codec that crashes or is killed fails
-its own frame only, and what runs in Python between the codecs does not wait for the other frames.
+is killed, and the parent notices a worker that dies. The task goes through that pipe too: what `Process.start` hands
+over is written to a pipe whose reading end the parent keeps open, so that writing more than the pipe holds to a
+worker that is dead would never end.
+
+Processes, not threads: a codec that crashes or is killed fails its own frame only, and what runs in Python between the
+codecs does not wait for the other frames.
 """
 
 from __future__ import annotations
@@ -13,10 +17,13 @@ import signal
 import sys
 from collections import deque
 from collections.abc import Callable, Generator, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
-from typing import Any, Protocol
+from multiprocessing.context import SpawnProcess
+from multiprocessing.reduction import ForkingPickler
+from typing import Any, Protocol, cast
 
 from pegbar.errors import describe
 
@@ -45,9 +52,14 @@ def run_frames(
     """Yield a result a frame, as they are finished.
 
     ``jobs`` is the number of worker processes (None: one a core); with one job or one frame the work is done here.
+    Workers import the main module: a script that calls this does so under ``if __name__ == "__main__":``, else
+    ChildProcessError is raised.
     When ``go_on`` says no, no further frame is begun and those in work are finished. Closing the iterator ends the
     workers at once; a frame in work is then left as it was before.
     """
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
+        # A worker that imports a script without a guard has come here: the parent says what is wrong.
+        sys.exit(1)
     count = min(jobs or available_cores(), len(frames))
     if count <= 1:
         _keep_memory()
@@ -75,24 +87,38 @@ def attempt(task: Task, frame: int) -> FrameResult:
         return FrameResult(frame, error=describe(error))
 
 
+@dataclass
+class _Worker:
+    """A worker process; it is ``ready`` when it has the task."""
+
+    process: SpawnProcess
+    ready: bool = False
+
+
 class _Pool:
     """Worker processes, each behind its own pipe."""
 
     def __init__(self, task: Task, count: int) -> None:
-        self.context = multiprocessing.get_context("spawn")
-        self.task = task
-        self.workers: dict[Connection, Any] = {}
-        with _environment(_ONE_THREAD):
-            for _ in range(count):
-                self._start()
+        self.task = ForkingPickler.dumps(task)
+        self.workers: dict[Connection, _Worker] = {}
+        # All are started before the first one is waited for.
+        for pipe in [self._start() for _ in range(count)]:
+            self._hand_over(pipe)
 
     def _start(self) -> Connection:
-        ours, theirs = self.context.Pipe()
-        worker = self.context.Process(target=_work, args=(theirs, self.task), daemon=True)
-        worker.start()
+        context = multiprocessing.get_context("spawn")
+        ours, theirs = context.Pipe()
+        process = context.Process(target=_work, args=(theirs,), daemon=True)
+        with _environment(_ONE_THREAD), _held_back(signal.SIGINT):
+            process.start()
+        # Without this end of ours, reading from or writing to a worker that is dead fails at once.
         theirs.close()
-        self.workers[ours] = worker
+        self.workers[ours] = _Worker(process)
         return ours
+
+    def _hand_over(self, pipe: Connection) -> None:
+        with suppress(ConnectionError):
+            pipe.send_bytes(self.task)
 
     def run(self, frames: deque[int], go_on: Callable[[], bool]) -> Iterator[FrameResult]:
         busy: dict[Connection, int] = {}
@@ -103,40 +129,59 @@ class _Pool:
                 busy[pipe] = frames.popleft()
                 with suppress(ConnectionError):
                     pipe.send(busy[pipe])
-            for ready in wait(list(busy)):
-                assert isinstance(ready, Connection)
-                pipe, frame = ready, busy.pop(ready)
-                try:
-                    result = pipe.recv()
-                except (EOFError, ConnectionError):
-                    result, pipe = self._replace(pipe, frame)
+            for pipe in cast(list[Connection], wait(list(busy))):
+                result = self._receive(pipe, busy[pipe])
+                if result is None:
+                    continue
+                del busy[pipe]
+                if pipe not in self.workers:
+                    pipe = self._start()
+                    self._hand_over(pipe)
                 idle.append(pipe)
                 yield result
 
-    def _replace(self, pipe: Connection, frame: int) -> tuple[FrameResult, Connection]:
+    def _receive(self, pipe: Connection, frame: int) -> FrameResult | None:
+        """What a worker says: the result of ``frame``, or None when it is ready; a dead one is taken out."""
+        try:
+            result: FrameResult | None = pipe.recv()
+        except (EOFError, OSError):
+            return self._bury(pipe, frame)
+        self.workers[pipe].ready = True
+        return result
+
+    def _bury(self, pipe: Connection, frame: int) -> FrameResult:
+        """Take a dead worker out; raise ChildProcessError where the next one would end like this one."""
         worker = self.workers.pop(pipe)
-        worker.join()
-        with _environment(_ONE_THREAD):
-            fresh = self._start()
-        return FrameResult(frame, error=f"the worker process ended (exit code {worker.exitcode})"), fresh
+        pipe.close()
+        worker.process.join()
+        code = worker.process.exitcode or 0
+        if not worker.ready and code > 0:
+            raise ChildProcessError(
+                f"the worker processes cannot start (exit code {code}): a script that uses several jobs must do its "
+                'work under if __name__ == "__main__":, since every worker imports the script; one job needs no workers'
+            ) from None
+        memory = ": is the memory full? fewer jobs take less" if code == -9 else ""
+        return FrameResult(frame, error=f"the worker process ended (exit code {code}){memory}")
 
     def close(self) -> None:
         for pipe in self.workers:
             pipe.close()
         for worker in self.workers.values():
-            worker.join(timeout=0.2)
-            if worker.is_alive():
-                worker.terminate()
-            worker.join()
+            worker.process.join(timeout=0.2)
+            if worker.process.is_alive():
+                worker.process.terminate()
+            worker.process.join()
 
 
-def _work(pipe: Connection, task: Task) -> None:
-    """Serve frames until the parent closes the pipe or is gone. Ctrl-C is the parent's to handle."""
+def _work(pipe: Connection) -> None:
+    """Take the task, then serve frames until the parent closes the pipe or is gone. Ctrl-C is the parent's."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
-    _single_thread()
-    _keep_memory()
     try:
+        task: Task = pipe.recv()
+        _single_thread()
+        _keep_memory()
+        pipe.send(None)
         while True:
             pipe.send(attempt(task, pipe.recv()))
     except (EOFError, ConnectionError):
@@ -167,19 +212,31 @@ def _keep_memory() -> None:
     set_option(mmap_threshold, most)
 
 
-class _environment:
-    """Environment variables that the processes started inside inherit."""
-
-    def __init__(self, values: dict[str, str]) -> None:
-        self.values = values
-
-    def __enter__(self) -> None:
-        self.before = {name: os.environ.get(name) for name in self.values}
-        os.environ.update(self.values)
-
-    def __exit__(self, *_: object) -> None:
-        for name, value in self.before.items():
+@contextmanager
+def _environment(values: dict[str, str]) -> Iterator[None]:
+    """Set environment variables, which the processes started inside inherit."""
+    before = {name: os.environ.get(name) for name in values}
+    os.environ.update(values)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
             if value is None:
                 del os.environ[name]
             else:
                 os.environ[name] = value
+
+
+@contextmanager
+def _held_back(number: signal.Signals) -> Iterator[None]:
+    """Hold a signal back, also in the processes started inside: what a worker does with it, it says itself."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    # Starting the tracker, which the first worker does, would let the signal through again.
+    resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {number})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

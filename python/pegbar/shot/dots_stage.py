@@ -62,12 +62,8 @@ class DotsStage:
         Raises ShotError for a shot without dots or drawings, FormatError for a broken palette, ValueError for colours
         that are too near to each other.
         """
-        section = self._section()
-        drawings, dots = self._sequence("drawing.frames"), self._sequence("dots.frames")
-        joints = self.joints()
-        keys = [number for number in drawings.numbers if number in set(dots.numbers)]
-        if not keys:
-            raise ShotError([f"{self.path}: dots.frames: no file has the number of a drawing"])
+        section, joints = self._section(), self.joints()
+        drawings, dots, keys = self.sequences()
         inputs = [drawings.path(number) for number in drawings.numbers] + [dots.path(number) for number in keys]
         recipe = self._recipe(joints)
         if not self.overwrite and is_up_to_date([self.output], recipe, inputs):
@@ -79,6 +75,14 @@ class DotsStage:
         write_annotations(self.output, drawing)
         write_record([self.output], recipe, [fingerprint(path) for path in inputs])
         return tuple(_remarks(found, tuple(joints.values()), numbers)), True
+
+    def sequences(self) -> tuple[FrameSequence, FrameSequence, list[int]]:
+        """Return drawings, dots, and the drawings that have dots; ShotError where there are none."""
+        drawings, dots = self._sequence("drawing.frames"), self._sequence("dots.frames")
+        keys = [number for number in drawings.numbers if number in set(dots.numbers)]
+        if not keys:
+            raise ShotError([f"{self.path}: dots.frames: no file has the number of a drawing"])
+        return drawings, dots, keys
 
     def joints(self) -> dict[str, str]:
         """Which joint each colour stands for."""
@@ -123,6 +127,10 @@ class DotsStage:
         carried, _ = carry_marks(marks, there, gray if follows else None, average=section.average)
         colors = {name: parse_color(color) for name, color in section.limbs.items()}
         limbs = tuple(replace(limb, color=colors.get(limb.name)) for limb in limbs_between(names))
+        known = [limb.name for limb in limbs]
+        if strange := [name for name in colors if name not in known]:
+            told = f"no limb {', '.join(strange)} between joints that have dots: dot both its ends"
+            raise ShotError([f"{self.path}: dots.limbs: {told} (there are {', '.join(known)})"])
         between = [number for number, key in zip(numbers, keyed, strict=True) if not key]
         return Drawing(
             names=names,

@@ -26,12 +26,16 @@ SLIT = 96
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """A drawn frame: ``color`` (H, W, 3|4) uint8 straight, ``alpha`` and ``depth`` (H, W) float32, and what to note."""
+    """A drawn frame: ``color`` (H, W, 3|4) uint8 straight, ``alpha`` and ``depth`` (H, W) float32, and what to note.
+
+    ``limbs`` are those that its labels show, as labels; None where there are no labels.
+    """
 
     color: NDArray[np.uint8]
     alpha: NDArray[np.float32]
     depth: NDArray[np.float32]
     notes: tuple[str, ...] = ()
+    limbs: frozenset[int] | None = None
 
 
 def drawn_inputs(shot: Shot, frame: int) -> list[Path]:
@@ -49,7 +53,7 @@ def read_drawn(shot: Shot, frame: int) -> Drawn:
     number, settings = shot.exposure.drawing(frame), shot.settings.drawing
     path = shot.drawings.path(number)
     picture = read_picture(path)
-    _check_size(frame, path, picture, shot.settings.shot.size)
+    check_size(frame, path, picture, shot.settings.shot.size)
     labels, notes = read_labels(shot, frame, picture)
     try:
         layer = matte(picture, shot.matte, labels=labels, white_point=settings.white_point)
@@ -59,7 +63,7 @@ def read_drawn(shot: Shot, frame: int) -> Drawn:
         depth_path = shot.drawing_depth.path(number)
         depth = read_passes(depth_path, want=("depth",)).depth
         assert depth is not None
-        _check_size(frame, depth_path, depth, _size(picture))
+        check_size(frame, depth_path, depth, _size(picture))
         return Drawn(layer.color, layer.alpha, depth, notes)
     if labels is None:
         raise ValueError(
@@ -73,11 +77,11 @@ def read_drawn(shot: Shot, frame: int) -> Drawn:
         layer = matte(picture, "fill", labels=labels, white_point=settings.white_point)
     if not labels.any() and layer.alpha.any():
         raise ValueError(f"frame {frame}: {path}: something is drawn, but no limb is marked in the label picture")
+    limbs = frozenset(np.flatnonzero(np.bincount(labels.ravel())).tolist())
     grown = grow_labels(labels, layer.alpha > 0, reach=settings.reach)
     ends, end_depths = limb_ends(shot, frame, grown)
-    return Drawn(
-        layer.color, layer.alpha, limb_depth(grown, ends, end_depths, interpolation=settings.interpolation), notes
-    )
+    depth = limb_depth(grown, ends, end_depths, interpolation=settings.interpolation)
+    return Drawn(layer.color, layer.alpha, depth, notes, limbs)
 
 
 def limb_ends(shot: Shot, frame: int, labels: NDArray[np.uint8]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -134,7 +138,7 @@ def _painted_labels(shot: Shot, frame: int, picture: NDArray[np.uint8]) -> tuple
     assert shot.labels is not None
     path = shot.labels.path(shot.exposure.drawing(frame))
     painted = read_picture(path)
-    _check_size(frame, path, painted, _size(picture))
+    check_size(frame, path, painted, _size(picture))
     palette, tolerance = shot.palette, shot.settings.drawing.tolerance
     if not len(palette.colors):
         raise ValueError(f"frame {frame}: no limb colours: the annotations' limbs have none and there is no palette")
@@ -156,7 +160,8 @@ def _size(picture: NDArray[np.uint8]) -> tuple[int, int]:
     return picture.shape[1], picture.shape[0]
 
 
-def _check_size(frame: int, path: Path, image: NDArray[np.generic], size: tuple[int, int] | None) -> None:
+def check_size(frame: int, path: Path, image: NDArray[np.generic], size: tuple[int, int] | None) -> None:
+    """Raise ValueError, naming ``frame`` and ``path``, for an image that is not ``size`` (width, height) large."""
     height, width = image.shape[:2]
     if size is not None and (width, height) != tuple(size):
         raise ValueError(f"frame {frame}: {path}: want {size[0]} x {size[1]} pixels, got {width} x {height}")

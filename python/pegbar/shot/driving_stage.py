@@ -20,6 +20,7 @@ from pegbar.errors import DegenerateError, FormatError
 from pegbar.io.alignment import read_alignment
 from pegbar.io.atomic import complete_file
 from pegbar.io.frames import read_picture, write_image
+from pegbar.io.hold import hold
 from pegbar.layer.box_edges import LimbEdges, ink_edges, label_edges
 from pegbar.layer.matte import ink_alpha
 from pegbar.layer.segmentation import grow_labels
@@ -32,10 +33,10 @@ from pegbar.scene.volumes import TaperedCylinders
 from pegbar.shot.align_stage import AlignStage
 from pegbar.shot.drawn import read_labels
 from pegbar.shot.driving import drive
-from pegbar.shot.marks import ALIGNED
+from pegbar.shot.marks import ALIGNED, outside_warnings
 from pegbar.shot.model import SecondarySection
 from pegbar.shot.plan import Shot, open_shot
-from pegbar.shot.record import fingerprint, is_up_to_date, write_record
+from pegbar.shot.record import fingerprint, forget, is_up_to_date, write_record
 
 VERSION = 3
 _SHEET, _SHEET_WIDTH = 24, 480
@@ -101,6 +102,13 @@ class DrivingStage:
             )
         return alignment, made
 
+    def remarks(self) -> list[str]:
+        """Return what looks wrong with the annotations; of those that are aligned, `pegbar align` says it."""
+        marks = self.bare.annotations
+        if self.is_aligned or marks is None:
+            return []
+        return outside_warnings(marks, {number: self.bare.marks[number] for number in self.numbers})
+
     def run(self, progress: Callable[[int, int], None] | None = None) -> tuple[Driving, bool]:
         """Find boxes and volumes, or read what is up to date; return them and whether they were made.
 
@@ -108,7 +116,11 @@ class DrivingStage:
         """
         if self.is_done():
             return read_driving(self.outputs()[0]), False
-        drawing = self._drawing()
+        with hold(self.folder):
+            return self._drive(progress), True
+
+    def _drive(self, progress: Callable[[int, int], None] | None) -> Driving:
+        prints, drawing = [fingerprint(path) for path in self._inputs()], self._drawing()
         with ThreadPoolExecutor(2) as pool:
             edges = []
             for done, found in enumerate(pool.map(self._edges, self.numbers), 1):
@@ -124,11 +136,11 @@ class DrivingStage:
             frame_rate=self.bare.settings.shot.frame_rate / self._hold(),
             clearance=self.section.clearance if self.section.separate else None,
         )
-        self.folder.mkdir(parents=True, exist_ok=True)
+        forget(self.outputs())
         write_driving(self.outputs()[0], driving)
         self._write_sheet(driving)
-        write_record(self.outputs(), self._recipe(), [fingerprint(path) for path in self._inputs()])
-        return driving, True
+        write_record(self.outputs(), self._recipe(), prints)
+        return driving
 
     def is_done(self) -> bool:
         """Whether the results stand and nothing that they depend on has changed."""

@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import TypeVar
 
 from pegbar.errors import describe
+from pegbar.io.exposure import Exposure
+from pegbar.io.exposure_sheet import read_exposure_sheet
 from pegbar.io.frames import PICTURE_SUFFIXES
 from pegbar.io.numbers import format_frames
 from pegbar.io.sequence import FrameSequence
@@ -46,10 +48,14 @@ class Problems:
             return function(*arguments)
         except (ValueError, OSError) as error:
             path = getattr(error, "key", ()) or tuple(key.split("."))
-            line = self.lines.get(path)
-            place = f"{self.source}:{line}" if line else self.source
-            self.found.append(f"{place}: {'.'.join(path)}: {describe(error)}")
+            self.found.append(f"{place_of(self.source, self.lines, path)}: {'.'.join(path)}: {describe(error)}")
             return None
+
+
+def place_of(source: str, lines: Mapping[tuple[str, ...], int], key: tuple[str, ...]) -> str:
+    """Return where ``key`` stands in ``source``: at its line, or at that of the section it would be in."""
+    line = next((lines[key[:size]] for size in range(len(key), 0, -1) if key[:size] in lines), None)
+    return f"{source}:{line}" if line else source
 
 
 def find_input(folder: Path, pattern: str | None) -> FrameSequence | None:
@@ -60,6 +66,20 @@ def find_input(folder: Path, pattern: str | None) -> FrameSequence | None:
     if not sequence.numbers:
         raise FileNotFoundError(f"no such file: {folder / pattern}")
     return sequence
+
+
+def find_exposure(drawing: DrawingSection, folder: Path, drawings: FrameSequence) -> Exposure:
+    """Return which drawing every frame shows; ValueError or OSError for a sheet that cannot be read or lacks it."""
+    if drawing.exposure is None:
+        return Exposure.of(drawing.hold, drawings.numbers)
+    sheet = read_exposure_sheet(folder / drawing.exposure)
+    try:
+        cells = sheet.level(drawing.level)
+    except ValueError as error:
+        raise KeyedError(("drawing", "level"), f"{drawing.exposure}: {error}") from None
+    if missing := sorted({cell for cell in cells if cell is not None} - {*drawings.numbers}):
+        raise ValueError(f"{drawing.exposure} shows drawing {format_frames(missing)}: there is no such picture")
+    return Exposure.of_cells(cells, sheet.first_frame)
 
 
 def plan_output(folder: Path, key: str, pattern: str) -> FrameSequence:
@@ -98,7 +118,7 @@ def match_marks(annotations: Drawing, drawings: FrameSequence, settings: Drawing
         return by_name
     if settings.first_marked is not None:
         return {settings.first_marked + index: index for index in range(count)}
-    if settings.hold == "sparse" and len(numbers) == count:
+    if (settings.hold == "sparse" or settings.exposure is not None) and len(numbers) == count:
         return {number: index for index, number in enumerate(numbers)}
     if settings.hold != "sparse" and numbers[-1] - numbers[0] + 1 == count:
         return {numbers[0] + index: index for index in range(count)}

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pegbar.io import atomic
 from pegbar.io.animation import write_animation
 from pegbar.io.frames import read_picture, write_image
+from pegbar.io.hold import hold
 from pegbar.io.motion import read_motion
 from pegbar.io.numbers import format_frames, parse_frames
 from pegbar.report.lift_preview import preview_frames
@@ -29,7 +30,7 @@ from pegbar.shot.film import film_moments
 from pegbar.shot.lift_choices import Hold, LiftOptions, Range
 from pegbar.shot.lift_files import FILES, film_of, write_film
 from pegbar.shot.lifting import lift_drawing
-from pegbar.shot.record import fingerprint, is_up_to_date, write_record
+from pegbar.shot.record import fingerprint, forget, is_up_to_date, write_record
 
 VERSION = 2
 #: A preview has no more pictures than this: of longer films every second or third.
@@ -67,25 +68,30 @@ class LiftStage:
         if self.is_done():
             found: dict[str, Any] = json.loads(report.read_text(encoding="utf-8"))
             return found, False
-        shot = self.align.shot
+        with hold(self.folder):
+            return self._lift(alignment), True
+
+    def _lift(self, alignment: Alignment) -> dict[str, Any]:
+        shot, prints = self.align.shot, [fingerprint(path) for path in self._inputs() if path.is_file()]
         assert shot.settings.clip is not None
         motion = read_clip(shot.settings.clip, shot.folder, Path(alignment.clip_path))
         clip = as_drawn(motion, alignment.mirrored, alignment.swapped, shot.settings.align.floor)
         rate = shot.settings.shot.frame_rate / float(self.align.holds().mean())
-        lifted = lift_drawing(alignment, clip, rate, self._options())
-        self.folder.mkdir(parents=True, exist_ok=True)
+        lifted = lift_drawing(alignment, clip, rate, self.options())
         values = quality(alignment, lifted, self.align.numbers)
         values["notes"] = notes(alignment, lifted, self.align.numbers, values, shot.settings.lift.stretch)
+        forget(self.outputs())
         self._write(alignment, lifted)
-        atomic.write_bytes(report, json.dumps(values, indent=1).encode())
-        write_record(self.outputs(), self._recipe(), [fingerprint(path) for path in self._inputs()])
-        return values, True
+        atomic.write_bytes(self.outputs()[0], json.dumps(values, indent=1).encode())
+        write_record(self.outputs(), self._recipe(), prints)
+        return values
 
     def is_done(self) -> bool:
         """Whether the results stand and nothing that they depend on has changed."""
         return not self.overwrite and is_up_to_date(self.outputs(), self._recipe(), self._inputs())
 
-    def _options(self) -> LiftOptions:
+    def options(self) -> LiftOptions:
+        """Return what the shot's section means; ValueError or OSError, naming the key or file, for what cannot be."""
         section = self.align.shot.settings.lift
         planted: bool | dict[str, list[Range]] = isinstance(section.planted, bool) and section.planted
         if not isinstance(section.planted, bool):

@@ -101,6 +101,8 @@ def _describe(source: str, places: dict[tuple[str, ...], int], table: dict[str, 
         problem = "no such key" + (f' (did you mean "{near[0]}"?)' if near else "")
     elif error["type"] == "missing":
         problem = "is missing"
+    elif error["type"] in ("model_type", "dict_type"):
+        problem = f"want a section, like [{name}]"
     elif isinstance(error["input"], str | int | float) and "got" not in problem:
         problem = f"{problem[0].lower()}{problem[1:]}, got {error['input']!r}"
     place = f"{source}:{line}" if line else source

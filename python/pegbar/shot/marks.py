@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pegbar.io.annotations import read_annotations
+from pegbar.io.numbers import format_frames
 from pegbar.scene.drawing import Drawing
 from pegbar.shot.model import ShotFile
 
@@ -40,6 +43,33 @@ def read_marks(settings: ShotFile, folder: Path, *, aligned: bool = True) -> Dra
     if not _are_the_same(marks, found):
         raise ValueError(f"{path} is not of these marks any more: run pegbar align again")
     return found
+
+
+def outside_marks(marks: Drawing, index: int) -> list[str]:
+    """Return the visible markers of frame ``index`` of ``marks`` that lie outside the picture, a line each."""
+    place, size = marks.markers[index], marks.image_size
+    return [
+        f"marker {marks.names[i]} at {np.round(place[i], 1).tolist()} lies outside the {size[0]} x {size[1]} picture"
+        for i in np.flatnonzero(_outside(marks)[index])
+    ]
+
+
+def outside_warnings(marks: Drawing, drawings: Mapping[int, int]) -> list[str]:
+    """Return a line for every marker that is marked outside the picture; ``drawings`` are numbers to frames."""
+    outside, (width, height) = _outside(marks), marks.image_size
+    found = []
+    for i in np.flatnonzero(outside.any(axis=0)):
+        numbers = sorted(number for number, index in drawings.items() if outside[index, i])
+        if numbers:
+            where = f"outside the {width} x {height} picture in drawings {format_frames(numbers)}"
+            found.append(f"{marks.names[i]} is marked {where}: its limbs may be misplaced")
+    return found
+
+
+def _outside(marks: Drawing) -> NDArray[np.bool_]:
+    """Which markers (F, N) are said to be visible and lie outside the picture."""
+    beyond = (marks.markers < -0.5) | (marks.markers > np.array(marks.image_size) - 0.5)
+    return np.asarray(marks.visible & beyond.any(axis=2))
 
 
 def _are_the_same(marks: Drawing, found: Drawing) -> bool:

@@ -50,6 +50,8 @@ class DrawingSection(Section):
 
     frames: str
     hold: Annotated[int, Field(ge=1)] | list[int] | Literal["sparse"] = 1
+    exposure: str | None = None
+    level: str | None = None
     labels: str | None = None
     annotations: str | None = None
     depth: str | None = None
@@ -64,6 +66,14 @@ class DrawingSection(Section):
     matte: Literal["auto", "ink", "unmix", "fill", "alpha"] = "auto"
     white_point: int = Field(255, ge=1, le=255)
     interpolation: Literal["linear", "perspective"] = "linear"
+
+    @model_validator(mode="after")
+    def _holds_or_has_a_sheet(self) -> DrawingSection:
+        if self.exposure is not None and self.hold != 1:
+            raise ValueError("hold: the exposure sheet says how long drawings are held; leave one of them out")
+        if self.level is not None and self.exposure is None:
+            raise ValueError("level: only an exposure sheet has levels")
+        return self
 
     @property
     def refuses_unknown_colors(self) -> bool:
@@ -234,6 +244,9 @@ class SecondarySection(Section):
     wind: WindSection = WindSection()
     pre_roll: int = Field(default=24, ge=0, le=10_000)
     seed: int = Field(default=0, ge=0)
+    engine: Literal["pegbar", "blender"] = "pegbar"
+    renderer: Literal["pegbar", "blender"] = "pegbar"
+    blender: str | None = None
     samples: int = Field(default=2, ge=1, le=8)
     shadow: bool = True
     passes: bool = True

@@ -22,6 +22,7 @@ from pegbar.scene.mesh import Mesh
 from pegbar.shot.drawn import Drawn, drawn_inputs, read_drawn
 from pegbar.shot.model import SecondarySection
 from pegbar.shot.plan import Shot
+from pegbar.shot.rendered import part_seen, read_rendered
 from pegbar.shot.stages import Stage, check_passes, write_final
 from pegbar.shot.view import LIGHT, View, lay_under, part_of, seen_window
 from pegbar.simulate.field_meshes import cast_on_fields
@@ -38,12 +39,18 @@ BANDS = (0.42, 0.75, 1.0)
 INK = Ink(1.8, (0.03, 0.012, 0.028, 1.0), None)
 
 
+def pen_width(size: tuple[int, int]) -> float:
+    """How wide lines are in a picture of ``size``, in pixels."""
+    return INK.width * size[0] / 960
+
+
 @dataclass(frozen=True, eq=False)
 class Layers:
     """Where a frame's elements come from and go to.
 
     ``first`` is the film frame of the scene's first, ``drawn`` the files of the characters in 3D; ``others`` are the
-    shots of further characters and ``scales`` what brings their depths to those of the shot's own camera.
+    shots of further characters and ``scales`` what brings their depths to those of the shot's own camera. ``rendered``
+    are the files that Blender rendered the elements to, None where pegbar renders them.
     """
 
     scene: SimulationScene
@@ -55,6 +62,7 @@ class Layers:
     characters: tuple[Path, ...]
     others: tuple[Shot, ...] = ()
     scales: tuple[float, ...] = ()
+    rendered: FrameSequence | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +86,8 @@ class ElementsStage(Stage):
         found = [layers.cache.folder / element.name / name for element in layers.scene.elements]
         for shot in (self.shot, *layers.others):
             found += drawn_inputs(shot, frame)
-        return [*found, *layers.characters]
+        rendered = [] if layers.rendered is None else [layers.rendered.path(frame)]
+        return [*found, *layers.characters, *rendered]
 
     def make(self, frame: int) -> tuple[str, ...]:
         view = self.render(frame)
@@ -94,17 +103,19 @@ class ElementsStage(Stage):
         layers = self.layers
         index, samples, ground = frame - layers.first, layers.section.samples, layers.scene.ground
         camera, meshes = layers.scene.cameras[index], self.models.meshes(layers.cache, index)
-        pen = INK.width * camera.image_size[0] / 960
+        pen = pen_width(camera.image_size)
         casting = self._casting(meshes, index) if layers.section.shadow and ground is not None else []
         meshes = cast_on_fields(layers.scene, meshes, casting, light=LIGHT)
         window = seen_window(camera, meshes, casting, ground or 0.0, pen)
         part = part_of(camera, window)
         # A shadow of its own is only for the file; without one it is rendered along with the elements.
-        apart = layers.section.passes
+        apart = layers.section.passes or layers.rendered is not None
         shown = meshes if apart or ground is None else [*meshes, *shadow_meshes(casting, ground, light=LIGHT)]
-        passes = render_passes(
-            shown, part, samples=samples, light=LIGHT, bands=BANDS, ink=Ink(pen, INK.color, INK.crease_angle)
-        )
+        if layers.rendered is None:
+            ink = Ink(pen, INK.color, INK.crease_angle)
+            passes = render_passes(shown, part, samples=samples, light=LIGHT, bands=BANDS, ink=ink)
+        else:
+            passes = part_seen(read_rendered(layers.rendered.path(frame), samples, camera.image_size, pen), window)
         shadow = None
         if apart and casting and ground is not None:
             shadow = render_shadow(casting, part, ground, samples=samples, light=LIGHT)
@@ -129,7 +140,7 @@ class ElementsStage(Stage):
         for place, (shot, scale) in enumerate(zip(shots, (1.0, *self.layers.scales), strict=True), 1):
             drawn = read_drawn(shot, frame)
             notes += drawn.notes
-            check_passes(frame, self.layers.passes.path(frame), drawn, beauty, depth)
+            check_passes(frame, self.layers.passes.path(frame), drawn.alpha.shape, beauty, depth)
             drawn_depth = drawn.depth * np.float32(scale)
             is_last = place == len(shots)
             beauty = depth_composite(
@@ -151,6 +162,7 @@ class ElementsStage(Stage):
         section = layers.section
         parts: list[Any] = [VERSION, [entry.model_dump() for entry in section.elements], section.seed, section.samples]
         parts += [section.shadow, layers.scene.ground, layers.first, layers.scales, shot.settings.output.model_dump()]
+        parts += [] if layers.rendered is None else ["blender"]
         for drawn in (shot, *layers.others):
             parts += [drawn.settings.drawing.model_dump(), drawn.matte]
             parts += [drawn.palette.colors.tolist(), drawn.palette.labels.tolist()]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
@@ -17,7 +18,16 @@ from pegbar.io.sequence import FrameSequence
 from pegbar.layer.matte import Mode
 from pegbar.scene.camera import PerspectiveCamera
 from pegbar.scene.drawing import Drawing
-from pegbar.shot.find import KeyedError, Problems, check_clash, find_input, match_marks, plan_output
+from pegbar.shot.find import (
+    KeyedError,
+    Problems,
+    check_clash,
+    find_exposure,
+    find_input,
+    match_marks,
+    place_of,
+    plan_output,
+)
 from pegbar.shot.load import key_lines, load_shot
 from pegbar.shot.marks import read_marks
 from pegbar.shot.model import ShotFile, parse_color
@@ -39,7 +49,7 @@ class Shot:
     """A validated shot with its sequences found, its marks read and its frames known.
 
     ``marks`` tells which frame of the annotations belongs to a drawing number; ``matte`` is the one that all frames
-    get.
+    get. ``source`` is the shot file as the user named it, ``lines`` where its keys stand.
     """
 
     settings: ShotFile
@@ -56,6 +66,12 @@ class Shot:
     palette: Palette
     matte: Mode
     outputs: dict[str, FrameSequence]
+    source: str = "options"
+    lines: Mapping[tuple[str, ...], int] = field(default_factory=dict)
+
+    def place(self, key: str) -> str:
+        """Return where ``key`` stands, as ``shot.toml:14``: its own line, or that of the section it would be in."""
+        return place_of(self.source, self.lines, tuple(key.split(".")))
 
     def output(self, key: str, frame: int) -> Path | None:
         """Return where ``frame`` of ``[output] key`` goes, or None where the shot file asks for none."""
@@ -96,7 +112,9 @@ def plan_shot(
     if beauty is not None and passes is not None and not passes.depth and beauty.suffix.lower() != ".exr":
         problems.call("passes.beauty", _refuse, f"{beauty.pattern} has no depth: passes.depth must name the depth pass")
     annotations = problems.call("drawing.annotations", partial(read_marks, aligned=aligned), settings, folder)
-    palette = problems.call("drawing.palette", _palette, settings, annotations)
+    read = annotations is not None or not drawing.annotations
+    # Without the marks that the shot names nothing can be said of limbs.
+    palette = problems.call("drawing.palette", _palette, settings, annotations) if read else None
     if settings.camera:
         size = settings.shot.size or (annotations.image_size if annotations else (1, 1))
         problems.call("camera.matrix", PerspectiveCamera, settings.camera.matrix, size)
@@ -104,7 +122,8 @@ def plan_shot(
     marks: dict[int, int] | None = {}
     exposure = frames = None
     if drawings is not None:
-        exposure = problems.call("drawing.hold", Exposure.of, drawing.hold, drawings.numbers)
+        key = "drawing.exposure" if drawing.exposure else "drawing.hold"
+        exposure = problems.call(key, find_exposure, drawing, folder, drawings)
         frames = problems.call("shot.frames", _frames, settings, exposure, beauty) if exposure else None
         if annotations is not None and not drawing.depth:
             marks = problems.call("drawing.annotations", match_marks, annotations, drawings, drawing)
@@ -112,7 +131,8 @@ def plan_shot(
         raise ShotError(problems.found)
     rest = inputs["drawing.labels"], inputs["drawing.depth"], beauty, inputs.get("passes.depth") or beauty
     matte = _matte(settings, drawings)
-    return Shot(settings, folder, frames, drawings, exposure, *rest, annotations, marks, palette, matte, outputs)
+    found = settings, folder, frames, drawings, exposure, *rest, annotations, marks, palette, matte, outputs
+    return Shot(*found, source, problems.lines)
 
 
 def _outputs(

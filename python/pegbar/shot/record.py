@@ -43,6 +43,11 @@ def write_record(outputs: list[Path], recipe: str, inputs: Iterable[list[Any]]) 
         part.write_text(json.dumps({"recipe": recipe, "inputs": list(inputs), "outputs": made}), encoding="utf-8")
 
 
+def forget(outputs: list[Path]) -> None:
+    """Take back that ``outputs`` are as recorded, before they are written: a run that is killed leaves some of them."""
+    record_path(outputs[0]).unlink(missing_ok=True)
+
+
 def is_up_to_date(outputs: list[Path], recipe: str, inputs: Iterable[Path]) -> bool:
     """Whether ``outputs`` stand as ``recipe`` made them, of ``inputs`` that have not changed since."""
     try:

@@ -6,10 +6,10 @@ import dataclasses
 import hashlib
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -17,10 +17,11 @@ from pegbar.errors import ShotError
 from pegbar.scene.driving import Driving
 from pegbar.shot.characters import drawn_rows, film_cameras, film_character, seen_by
 from pegbar.shot.driving_stage import DrivingStage
-from pegbar.shot.find import plan_output
-from pegbar.shot.load import load_shot
+from pegbar.shot.find import place_of, plan_output
+from pegbar.shot.load import key_lines, load_shot
 from pegbar.shot.model import ElementEntry, SecondarySection
 from pegbar.shot.plan import Shot
+from pegbar.simulate.blender.locate import Blender, find_blender
 from pegbar.simulate.elements import Element
 from pegbar.simulate.materials import Wind
 from pegbar.simulate.presets import check_preset, preset_elements
@@ -33,10 +34,12 @@ _LOOKS = {"color", "second", "pattern", "pattern_size", "colors"}
 
 @dataclass(frozen=True, eq=False)
 class Secondary:
-    """The secondary motion of the shot file ``path``."""
+    """The secondary motion of the shot file ``path``; ``engine`` and ``renderer`` go before the file's own."""
 
     path: Path
     overwrite: bool = False
+    engine: Literal["pegbar", "blender"] | None = field(default=None, kw_only=True)
+    renderer: Literal["pegbar", "blender"] | None = field(default=None, kw_only=True)
 
     @cached_property
     def section(self) -> SecondarySection:
@@ -44,12 +47,24 @@ class Secondary:
         found = load_shot(self.path).secondary
         if found is None:
             raise ShotError([f'{self.path}: the shot has no [secondary]: elements = ["skirt"] is enough'])
-        return found
+        chosen = {"engine": self.engine, "renderer": self.renderer}
+        return found.model_copy(update={key: value for key, value in chosen.items() if value is not None})
 
     def check(self) -> None:
         """Raise ShotError for what the section asks for and there is not, before any work."""
         if problems := secondary_problems(self.section, self.path.absolute().parent):
-            raise ShotError([f"{self.path}: {problem}" for problem in problems])
+            lines = key_lines(self.path.read_text(encoding="utf-8-sig"))
+            keys = [tuple(problem.partition(":")[0].split(".")) for problem in problems]
+            raise ShotError(
+                [f"{place_of(str(self.path), lines, key)}: {line}" for key, line in zip(keys, problems, strict=True)]
+            )
+        if "blender" in (self.section.engine, self.section.renderer):
+            _ = self.blender
+
+    @cached_property
+    def blender(self) -> Blender:
+        """The Blender to use; MissingExtraError or BlenderError where there is none."""
+        return find_blender(self.section.blender, folder=self.path.absolute().parent)
 
     @property
     def folder(self) -> Path:
@@ -149,6 +164,7 @@ class Secondary:
         parts: list[Any] = [VERSION, entries, section.ground, section.gravity, section.wind.model_dump()]
         parts += [section.pre_roll, section.seed, self.frames, self.names]
         parts += [self.stages[0].bare.settings.shot.frame_rate]
+        parts += [] if section.engine == "pegbar" else [section.engine]
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 
     def inputs(self) -> list[Path]:

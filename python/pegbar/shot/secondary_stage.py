@@ -5,12 +5,12 @@ from __future__ import annotations
 import dataclasses
 import json
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -22,13 +22,16 @@ from pegbar.report.contact_sheet import contact_sheet, over_paper
 from pegbar.scene.alignment import Alignment
 from pegbar.scene.camera import PerspectiveCamera
 from pegbar.scene.driving import Driving
+from pegbar.shot.blender_stage import BlenderStage
 from pegbar.shot.dots_stage import DotsStage
 from pegbar.shot.find import plan_output
 from pegbar.shot.passes_stage import ElementsStage, Layers
 from pegbar.shot.secondary import Secondary
 from pegbar.shot.simulation_stage import SimulationStage
+from pegbar.simulate.blender.engine import BlenderEngine
 from pegbar.simulate.cloth import ClothEngine
 from pegbar.simulate.elements import Cloth
+from pegbar.simulate.engine import Engine
 from pegbar.simulate.measures import measure_cloth, measure_particles
 from pegbar.simulate.particles import ParticleEngine
 from pegbar.simulate.rapier import RapierEngine
@@ -43,7 +46,7 @@ ENGINES = (RapierEngine(), ClothEngine(), ParticleEngine())
 
 @dataclass(eq=False)
 class SecondaryStage:
-    """Runs the stages of the shot file ``path``.
+    """Runs the stages of the shot file ``path``; ``engine`` and ``renderer`` go before the file's own.
 
     ``times`` are seconds a stage, ``notes`` what was assumed, and ``warnings`` what looks wrong.
     """
@@ -55,11 +58,13 @@ class SecondaryStage:
     notes: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     made: dict[str, bool] = field(default_factory=dict)
+    engine: Literal["pegbar", "blender"] | None = field(default=None, kw_only=True)
+    renderer: Literal["pegbar", "blender"] | None = field(default=None, kw_only=True)
 
     @cached_property
     def secondary(self) -> Secondary:
         """What the shot's section means."""
-        return Secondary(self.path, self.overwrite)
+        return Secondary(self.path, self.overwrite, engine=self.engine, renderer=self.renderer)
 
     def drive(self) -> list[Driving]:
         """Read dots, align, and find boxes and volumes of every character, where that is out of date."""
@@ -78,16 +83,25 @@ class SecondaryStage:
         for alignment, _ in alignments:
             self.notes += () if alignment is None else alignment.notes
             self.warnings += () if alignment is None else alignment.warnings
+        for stage in self.secondary.stages:
+            self.warnings += stage.remarks()
         drivings = [driving for driving, _ in found]
         for driving in drivings:
             self.warnings += driving.notes
         return drivings
 
+    @property
+    def engines(self) -> tuple[Engine, ...]:
+        """What simulates."""
+        if self.secondary.section.engine == "pegbar":
+            return ENGINES
+        return (BlenderEngine(self.secondary.blender), ParticleEngine())
+
     def simulate(self, drivings: list[Driving]) -> SimulationScene:
         """Simulate what is out of date; return the scene. SimulationError where it explodes."""
         with self._timed("simulation"):
             scene = self.secondary.scene(drivings)
-            self.made["simulation"] = SimulationStage(self.secondary, scene, ENGINES).run(self.progress)
+            self.made["simulation"] = SimulationStage(self.secondary, scene, self.engines).run(self.progress)
         return scene
 
     def frames(self, drivings: list[Driving], scene: SimulationScene) -> ElementsStage:
@@ -97,6 +111,7 @@ class SecondaryStage:
         output = shot.settings.output.model_copy(update={"frames": section.frames})
         planned = dataclasses.replace(shot, settings=shot.settings.model_copy(update={"output": output}))
         lenses = [PerspectiveCamera(driving.matrices[0], driving.image_size).focal_length for driving in drivings]
+        rendered = plan_output(secondary.folder, "depth", "blender/elements.####.exr")
         layers = Layers(
             scene=scene,
             section=section,
@@ -107,8 +122,19 @@ class SecondaryStage:
             characters=tuple(secondary.inputs()),
             others=tuple(others),
             scales=tuple(lenses[0] / lens for lens in lenses[1:]),
+            rendered=rendered if section.renderer == "blender" else None,
         )
         return ElementsStage(planned, self.overwrite, layers=layers)
+
+    def render(self, stage: ElementsStage, frames: Sequence[int]) -> None:
+        """Have Blender render the elements of ``frames`` where that is asked for and out of date.
+
+        Raises BlenderError where it fails; what it had finished is kept.
+        """
+        if stage.layers.rendered is not None:
+            with self._timed("Blender"):
+                work = BlenderStage(stage.layers, self.secondary.blender, self.overwrite)
+                self.made["Blender"] = work.run(frames, self._told("Blender")) > 0
 
     def finish(self, scene: SimulationScene, drivings: list[Driving], finals: list[Path]) -> dict[str, Any]:
         """Write animation, contact sheet and report; return the report."""
@@ -130,6 +156,8 @@ class SecondaryStage:
             "frames": scene.frames,
             "characters": [character.name for character in scene.characters],
             "elements": [element.name for element in scene.elements],
+            "engine": self.secondary.section.engine,
+            "renderer": self.secondary.section.renderer,
             "ground_m": scene.ground,
             "reprojection_px": max(apart),
             "overlap_before_m": float(max(driving.overlaps[:, 0].max(initial=0) for driving in drivings)),

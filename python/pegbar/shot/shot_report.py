@@ -42,6 +42,11 @@ def report_sections(shot: Shot) -> list[Section]:
     return [*found, *_finished(shot)]
 
 
+def has_results(sections: list[Section]) -> bool:
+    """Whether `report_sections` found a stage that has run."""
+    return len(sections) > 1
+
+
 def _about(shot: Shot) -> Section:
     marks = shot.annotations
     rows = [

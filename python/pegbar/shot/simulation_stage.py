@@ -11,8 +11,9 @@ from typing import Any
 
 from pegbar.errors import SimulationError
 from pegbar.io import atomic
+from pegbar.io.hold import hold
 from pegbar.io.simulation_cache import DiskCache
-from pegbar.shot.record import fingerprint, is_up_to_date, write_record
+from pegbar.shot.record import fingerprint, forget, is_up_to_date, write_record
 from pegbar.shot.secondary import Secondary
 from pegbar.simulate.engine import Engine, simulate_scene
 from pegbar.simulate.scene import SimulationScene
@@ -41,11 +42,15 @@ class SimulationStage:
 
         Raises SimulationError, naming the film frame, for a simulation that explodes; the frames before it are kept.
         """
+        with hold(self.cache.folder):
+            return self._simulate(progress)
+
+    def _simulate(self, progress: Callable[[str, int, int], None] | None) -> bool:
         inputs, recipe = self.secondary.inputs(), self.secondary.recipe()
         if not self.secondary.overwrite and is_up_to_date([self.output], recipe, inputs) and self._is_whole():
             return False
         prints = [fingerprint(path) for path in inputs]
-        self.cache.folder.mkdir(parents=True, exist_ok=True)
+        forget([self.output])
         started, state = self.cache.folder / "begun.json", _begun(recipe, prints)
         same = started.is_file() and started.read_text(encoding="utf-8") == state
         names = [element.name for element in self.scene.elements]

@@ -24,7 +24,7 @@ from pegbar.report.contact_sheet import over_paper
 from pegbar.report.depth_picture import depth_picture
 from pegbar.shot.drawn import Drawn, drawn_inputs, read_drawn
 from pegbar.shot.plan import Shot
-from pegbar.shot.record import fingerprint, is_up_to_date, write_record
+from pegbar.shot.record import fingerprint, forget, is_up_to_date, write_record
 
 VERSION = 2
 
@@ -54,6 +54,7 @@ class Stage:
         if self.is_done(frame):
             return Outcome(False, tuple(outputs))
         recipe, prints = self._recipe(frame), [fingerprint(path) for path in inputs]
+        forget(outputs)
         notes = self.make(frame)
         write_record(outputs, recipe, prints)
         return Outcome(True, tuple(outputs), notes)
@@ -147,7 +148,7 @@ class CompositeStage(Stage):
     def make(self, frame: int) -> tuple[str, ...]:
         drawn = read_drawn(self.shot, frame)
         beauty, depth, space = self.read_rendered(frame)
-        check_passes(frame, self.inputs(frame)[-1], drawn, beauty, depth)
+        check_passes(frame, self.inputs(frame)[-1], drawn.alpha.shape, beauty, depth)
         depth = rim_depth(beauty, depth)
         target = self.shot.settings.output.composite_space
         final, *holdout = self.outputs(frame)
@@ -191,9 +192,9 @@ class CompositeStage(Stage):
         return beauty, depth, by_file if settings.space == "auto" else settings.space
 
 
-def check_passes(frame: int, path: Path, drawn: Drawn, beauty: NDArray[Any], depth: NDArray[Any]) -> None:
-    """Refuse passes that are not the same whole number of times larger than the drawing, naming ``frame``."""
-    (height, width), got = drawn.alpha.shape, beauty.shape[:2]
+def check_passes(frame: int, path: Path, drawn: tuple[int, ...], beauty: NDArray[Any], depth: NDArray[Any]) -> None:
+    """Refuse passes that are not the same whole number of times larger than the drawing's (H, W), naming ``frame``."""
+    (height, width), got = drawn, beauty.shape[:2]
     factor = got[0] // height
     if got != depth.shape or factor < 1 or got != (height * factor, width * factor):
         raise ValueError(

@@ -2,22 +2,33 @@
 
 from __future__ import annotations
 
+import os
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 from pegbar.errors import MissingFrameError
 from pegbar.io.annotations import read_annotations
+from pegbar.io.exposure import Exposure
+from pegbar.io.exposure_sheet import read_exposure_sheet
 from pegbar.io.frames import read_picture
 from pegbar.io.numbers import format_frames
 from pegbar.io.sequence import FrameSequence, find_sequences
+from pegbar.layer.dots import flat_colors
+from pegbar.scene.body import MARKERS, limbs_between
 from pegbar.shot.record import FOLDER as RECORDS
 
 # Which words in folder or file names say what a sequence holds; the first that fits counts, plain drawings come last.
 _KINDS = {
+    "holdout": r"\b(hold-?outs?|mattes?|align|overlays?)\b",
+    "dots": r"\b(dots?|joints?|marks?)\b",
     "depth": r"\b(z?depth|z)\b",
     "beauty": r"\b(beauty|pass(es)?|renders?|rgba)\b",
     "labels": r"\b(labels?|seg|segmentation|masks?|limbs?|colou?rs?)\b",
 }
+# Pictures in which colours of dots and limbs are looked for: a joint may be hidden in some.
+_LOOKED_AT = 8
+_SIDED = ("shoulder", "elbow", "hand", "hip", "knee", "foot")
 _EXAMPLES = {
     "labels": "labels/labels.####.png",
     "annotations": "annotation.json",
@@ -26,11 +37,11 @@ _EXAMPLES = {
 }
 
 
-def start_shot(folder: Path, drawings: str | None = None) -> str:
+def start_shot(folder: Path, drawings: str | None = None, exposure: Path | None = None) -> str:
     """Return the text of a shot file for the drawn frames in ``folder`` and the folders below it.
 
-    ``drawings`` names their sequence where it cannot be told. Raises MissingFrameError where there is no picture
-    sequence, and ValueError where several could be the drawings.
+    ``drawings`` names their sequence where it cannot be told, ``exposure`` is an exposure sheet. Raises
+    MissingFrameError where there is no picture sequence, and ValueError where several could be the drawings.
     """
     folder = folder.absolute()
     annotations = _annotations(folder)
@@ -49,7 +60,8 @@ def start_shot(folder: Path, drawings: str | None = None) -> str:
     if len(found["drawings"]) > 1:
         names = ", ".join(_relative(sequence, folder) for sequence in found["drawings"])
         raise ValueError(f"{folder}: several sequences could be the drawings: {names}; choose with --drawings")
-    return _text(folder, found["drawings"][0], found, annotations)
+    text = _text(folder, found["drawings"][0], found, annotations)
+    return text if exposure is None else _with_sheet(text, folder, exposure, found["drawings"][0])
 
 
 def _annotations(folder: Path) -> Path | None:
@@ -97,6 +109,8 @@ def _text(
     values = {kind: _relative(found[kind][0], folder) for kind in ("labels", "beauty", "depth") if found[kind]}
     if annotations is not None:
         values["annotations"] = annotations.name
+    elif found["dots"]:
+        values["annotations"] = "marks.json"
     taken = {Path(value).parent.as_posix() for value in values.values()}
     own = "depth" if "depth" not in taken else "drawing_depth"
     return f"""\
@@ -129,7 +143,58 @@ frames = "final/final.####.png"
 depth = "{own}/depth.####.exr"
 depth_picture = "{own}/depth.####.png"
 # holdout = "holdout/holdout.####.png"   # the matte that holds the render out, for Nuke or Natron
-"""
+
+# [secondary]                # cloth and balls that collide with the drawing: pegbar secondary
+# elements = ["scarves", "skirt", "balls"]
+{_dots(found, folder)}"""
+
+
+def _dots(found: dict[str, list[FrameSequence]], folder: Path) -> str:
+    """The sections for a layer of dots: its colours, for the user to say which joint and limb each is."""
+    if not found["dots"]:
+        return ""
+    joints = "".join(f'# "{color}" = "?"    # {place}\n' for color, place in _colors(found["dots"][0]))
+    limbs = "".join(
+        f'# ? = "{color}"    # {place}\n' for labels in found["labels"][:1] for color, place in _colors(labels)
+    )
+    return f"""
+[dots]
+frames = {_quoted(_relative(found["dots"][0], folder))}
+
+[dots.joints]                # for every colour its joint; then run: pegbar dots
+# {", ".join(MARKERS[:4])}, and left_ and right_ {", ".join(_SIDED)}
+{joints}
+[dots.limbs]                 # for every limb its colour in the label pictures, none where there are none
+# {", ".join(limb.name for limb in limbs_between(MARKERS) if not limb.name.startswith("right_"))}, and right_ ...
+{limbs}"""
+
+
+def _colors(sequence: FrameSequence) -> Iterator[tuple[str, str]]:
+    """The colours in some pictures of ``sequence``, and where each is seen."""
+    known = set()
+    numbers = sequence.numbers
+    for number in numbers[:: max(1, len(numbers) // _LOOKED_AT)]:
+        path = sequence.path(number)
+        for color, (x, y) in flat_colors(read_picture(path)).items():
+            if color not in known:
+                known.add(color)
+                yield f"#{bytes(color).hex()}", f"at x {x}, y {y} in {path.name}"
+
+
+def _with_sheet(text: str, folder: Path, exposure: Path, drawings: FrameSequence) -> str:
+    """The shot file with the sheet in it, and with the sheet's frames; FormatError for one that cannot be read."""
+    sheet = read_exposure_sheet(exposure)
+    name = next(iter(sheet.levels)) if len(sheet.levels) > 1 else None
+    for level in sheet.levels:
+        if drawings.prefix.strip("._-").lower() == level.lower():
+            name = level if len(sheet.levels) > 1 else None
+    path = Path(os.path.relpath(exposure.absolute(), folder)).as_posix()
+    lines = f"exposure = {_quoted(path)}\n"
+    if name is not None:
+        lines += f"level = {_quoted(name)}   # of {', '.join(sheet.levels)}\n"
+    frames = list(Exposure.of_cells(sheet.level(name), sheet.first_frame).frames)
+    text = re.sub(r'(?m)^frames = ".*"$', f'frames = "{format_frames(frames).replace(" ", "")}"', text, count=1)
+    return re.sub(r"(?m)^# hold = 2 .*\n", lambda _: lines, text)
 
 
 def _line(key: str, values: dict[str, str]) -> str:

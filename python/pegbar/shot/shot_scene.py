@@ -1,0 +1,84 @@
+"""A shot's cameras and characters for other packages, from its shot file: aligned and measured where out of date."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from pegbar.export.shot_scene import ShotScene
+from pegbar.scene.alignment import Alignment
+from pegbar.shot.dots_stage import DotsStage
+from pegbar.shot.load import load_shot
+from pegbar.shot.model import SecondarySection
+from pegbar.shot.plan import Shot
+from pegbar.shot.secondary import Secondary
+from pegbar.shot.secondary_stage import Progress
+
+
+@dataclass(frozen=True, eq=False)
+class Tracked(Secondary):
+    """The characters of the shot file ``path`` in 3D, also of one without a ``[secondary]`` section.
+
+    Its results are then in ``spare``, else where `pegbar secondary` has them.
+    """
+
+    spare: Path = Path("export")
+
+    @cached_property
+    def section(self) -> SecondarySection:
+        """The shot's ``[secondary]``, or one that asks for nothing."""
+        return load_shot(self.path).secondary or SecondarySection()
+
+    @property
+    def folder(self) -> Path:
+        """Where the characters' volumes are kept."""
+        if load_shot(self.path).secondary is None:
+            return self.spare
+        return super().folder
+
+
+def shot_scene(tracked: Tracked, progress: Progress | None = None) -> tuple[ShotScene, list[str]]:
+    """Return the shot's cameras and characters for every film frame, and what was assumed or looks wrong.
+
+    Reads dots, aligns, and finds limb boxes and volumes where that is out of date; raises what these stages raise.
+    """
+    notes: list[str] = []
+    dots = DotsStage(tracked.path, tracked.overwrite)
+    if dots.is_wanted:
+        notes += dots.run()[0]
+    alignments: list[Alignment | None] = []
+    for stage in tracked.stages:
+        tell = None if progress is None else lambda done, total: progress("align", done, total)
+        alignments.append(stage.align(tell)[0])
+    drivings = []
+    for stage in tracked.stages:
+        tell = None if progress is None else lambda done, total: progress("volumes", done, total)
+        drivings.append(stage.run(tell)[0])
+    for alignment in alignments:
+        notes += () if alignment is None else (*alignment.notes, *alignment.warnings)
+    for driving in drivings:
+        notes += driving.notes
+    characters, scene = tracked.characters(drivings)
+    shot, known = tracked.stages[0].bare, set(drivings[0].numbers)
+    drawings = tuple(_drawing(shot, frame) for frame in tracked.frames)
+    if lost := sum(number not in known for number in drawings):
+        notes.append(f"{lost} of {len(drawings)} frames show no drawing with marks: characters are hidden there")
+    found = ShotScene(
+        tracked.names[0],
+        tracked.frames,
+        scene.frame_rate,
+        drawings,
+        scene.cameras,
+        tuple(characters),
+        scene.ground,
+        tuple(None if number is None else shot.drawings.path(number) for number in drawings),
+    )
+    return found, list(dict.fromkeys(notes))
+
+
+def _drawing(shot: Shot, frame: int) -> int | None:
+    try:
+        return shot.exposure.drawing(frame)
+    except ValueError:
+        return None
