@@ -4,6 +4,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use glam::DVec3;
 use pegbar_kernels::particles::{Nature, phase, step_particles};
 use pegbar_kernels::surroundings::Surroundings;
+use std::f64::consts::TAU;
 
 const COUNT: usize = 5000;
 const SUBSTEPS: usize = 4;
@@ -17,7 +18,7 @@ fn spread(index: usize, step: f64) -> f64 {
 
 fn canopy() -> (Vec<DVec3>, Vec<[u32; 3]>) {
     let at = |ring: u32, spoke: u32| {
-        let (out, turn) = (f64::from(ring) / f64::from(RINGS), f64::from(spoke) * 0.5236);
+        let (out, turn) = (f64::from(ring) / f64::from(RINGS), f64::from(spoke) * TAU / 12.0);
         DVec3::new(out * turn.cos(), 2.2 - 0.3 * out * out, out * turn.sin())
     };
     let vertices = (0..RINGS).flat_map(|ring| (0..12).map(move |spoke| at(ring + 1, spoke))).collect();

@@ -94,6 +94,8 @@ from .simulate.elements import Pin as Pin
 from .simulate.elements import Prop as Prop
 from .simulate.elements import Strands as Strands
 from .simulate.engine import simulate_scene as simulate_scene
+from .simulate.fields import Puddle as Puddle
+from .simulate.fields import SnowField as SnowField
 from .simulate.layers import render_shadow as render_shadow
 from .simulate.layers import shadow_meshes as shadow_meshes
 from .simulate.materials import ClothMaterial as ClothMaterial

@@ -154,13 +154,14 @@ impl<'a> Pen<'a> {
         }
         let swap = band.reciprocal[second] > band.reciprocal[first];
         let (nearer, farther) = if swap { (second, first) } else { (first, second) };
-        if self.surface(band, nearer).is_some_and(|surface| BARE.contains(&surface.object)) {
+        let bare = |at| self.surface(band, at).is_some_and(|surface| BARE.contains(&surface.object));
+        if bare(nearer) {
             return;
         }
         let ends = self.ends_between(band, nearer, farther);
         if ends && !self.dives_between(band, nearer, farther) {
             found.push((nearer as u32, Stroke::Outline));
-        } else if ends || self.folds_between(band, nearer, farther) {
+        } else if (ends && !bare(farther)) || self.folds_between(band, nearer, farther) {
             found.push((nearer as u32, Stroke::CreaseNearer));
             found.push((farther as u32, Stroke::CreaseFarther));
         }

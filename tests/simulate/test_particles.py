@@ -292,7 +292,7 @@ def test_the_box_is_what_the_cameras_see_round_the_character():
     figure = walker(3)
     near = PerspectiveCamera.look_at((0, 1, 5), (0, 1, 0), (160, 90), 0.6)
     wide = PerspectiveCamera.look_at((0, 1, 5), (0, 1, 0), (160, 90), 1.2)
-    (small,), (large,) = (preset_elements("snow", figure, ground=0.0, cameras=(c,) * 3) for c in (near, wide))
+    small, large = (preset_elements("snow", figure, ground=0.0, depth=0.0, cameras=(c,) * 3)[0] for c in (near, wide))
     assert (large.high - large.low > small.high - small.low)[0]
     pixels = np.array([[0, 0], [159, 0], [159, 89]], float)
     corners = near.unproject(pixels, np.full(3, 5.0))

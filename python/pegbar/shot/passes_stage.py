@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -17,12 +18,15 @@ from pegbar.io.sequence import FrameSequence
 from pegbar.io.simulation_cache import DiskCache
 from pegbar.layer.composite import Space, depth_composite
 from pegbar.layer.rim import rim_depth
+from pegbar.scene.mesh import Mesh
 from pegbar.shot.drawn import Drawn, drawn_inputs, read_drawn
 from pegbar.shot.model import SecondarySection
 from pegbar.shot.plan import Shot
 from pegbar.shot.rendered import part_seen, read_rendered
 from pegbar.shot.stages import Stage, check_passes, write_final
 from pegbar.shot.view import LIGHT, View, lay_under, part_of, seen_window
+from pegbar.simulate.field_meshes import cast_on_fields
+from pegbar.simulate.fields import Puddle, SnowField
 from pegbar.simulate.layers import render_shadow, shadow_meshes
 from pegbar.simulate.meshes import Models, volume_meshes
 from pegbar.simulate.passes import Ink, Passes, render_passes
@@ -108,10 +112,8 @@ class ElementsStage(Stage):
         index, samples, ground = frame - layers.first, layers.section.samples, layers.scene.ground
         camera, meshes = layers.scene.cameras[index], self.models.meshes(layers.cache, index)
         pen = pen_width(camera.image_size)
-        casting = [mesh for mesh in meshes if mesh.object_id < BARE]
-        casting = (
-            [*casting, *volume_meshes(layers.scene, index)] if layers.section.shadow and ground is not None else []
-        )
+        casting = self._casting(meshes, index) if layers.section.shadow and ground is not None else []
+        meshes = cast_on_fields(layers.scene, meshes, casting, light=LIGHT)
         window = seen_window(camera, meshes, casting, ground or 0.0, pen)
         part = part_of(camera, window)
         # A shadow of its own is only for the file; without one it is rendered along with the elements.
@@ -127,6 +129,13 @@ class ElementsStage(Stage):
             shadow = render_shadow(casting, part, ground, samples=samples, light=LIGHT)
             lay_under(passes, shadow)
         return View(camera.image_size, window, passes, shadow)
+
+    def _casting(self, meshes: Sequence[Mesh], index: int) -> list[Mesh]:
+        """What casts shadows: the elements but particles and what lies on the ground, and the characters."""
+        scene = self.layers.scene
+        flat = {scene.object_id(e.name) for e in scene.elements if isinstance(e, SnowField | Puddle)}
+        raised = [mesh for mesh in meshes if mesh.object_id < BARE and mesh.object_id not in flat]
+        return raised + volume_meshes(scene, index)
 
     def _composite(self, frame: int, passes: Passes) -> tuple[NDArray[Any], tuple[str, ...]]:
         """Put one character after the other into what is rendered, the shot's own first."""

@@ -94,7 +94,9 @@ class SecondaryStage:
     @property
     def engines(self) -> tuple[Engine, ...]:
         """What simulates."""
-        return ENGINES if self.secondary.section.engine == "pegbar" else (BlenderEngine(self.secondary.blender),)
+        if self.secondary.section.engine == "pegbar":
+            return ENGINES
+        return (BlenderEngine(self.secondary.blender), ParticleEngine())
 
     def simulate(self, drivings: list[Driving]) -> SimulationScene:
         """Simulate what is out of date; return the scene. SimulationError where it explodes."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pegbar import arrays
 from pegbar.simulate.chains import Bobs as Bobs
 from pegbar.simulate.chains import Strands as Strands
+from pegbar.simulate.fields import Puddle, SnowField
 from pegbar.simulate.materials import ClothMaterial, Look, RigidMaterial, positive
 from pegbar.simulate.pins import Pin as Pin
 from pegbar.simulate.pins import check_pins
@@ -116,7 +117,8 @@ class Prop:
     """A thing held in a hand: it follows its pin and pushes what it meets, and nothing moves it.
 
     ``vertices`` (n, 3) is its mesh before the first frame, world metres; ``capsules`` (c, 8) are the volumes that
-    push: start (3) and its radius, end (3) and its radius.
+    push: start (3) and its radius, end (3) and its radius. ``colors`` (n, 4) straight linear RGBA are the vertices' own
+    (None: all have the look's).
     """
 
     name: str
@@ -125,15 +127,18 @@ class Prop:
     pin: Pin
     capsules: Floats = field(default_factory=lambda: np.empty((0, 8)))
     look: Look = field(default_factory=Look)
+    colors: NDArray[np.float32] | None = None
 
     def __post_init__(self) -> None:
         vertices = arrays.floats("vertices", self.vertices, ("n", 3))
         _set(self, "vertices", vertices)
         _set(self, "triangles", arrays.integers("triangles", self.triangles, ("T", 3), low=0, high=len(vertices) - 1))
         _set(self, "capsules", arrays.floats("capsules", self.capsules, ("c", 8)))
+        if self.colors is not None:
+            _set(self, "colors", arrays.floats("colors", self.colors, (len(vertices), 4), dtype=np.float32))
 
 
-Element = Cloth | Strands | Balls | Boxes | Prop | Particles
+Element = Cloth | Strands | Balls | Boxes | Prop | Particles | SnowField | Puddle
 
 
 def _set_rigid(bodies: Balls | Boxes) -> None:

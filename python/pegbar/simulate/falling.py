@@ -32,14 +32,14 @@ class Snow:
     the character snow falls, in body heights.
     """
 
-    count: int = 1500
-    size: float = 0.014
+    count: int = 3000
+    size: float = 0.011
     fall_speed: float = 1.1
     flutter: float = 0.3
     stick: float = 0.8
-    settle: float = 5.0
+    settle: float = 8.0
     reach: float = 1.5
-    color: Color = (0.75, 0.86, 1.0, 1.0)
+    color: Color = (0.62, 0.78, 1.0, 1.0)
 
     def build(
         self,

@@ -12,6 +12,8 @@ from pegbar.scene.camera import PerspectiveCamera
 from pegbar.scene.mesh import Mesh, smooth_normals
 from pegbar.simulate.cache import Cache
 from pegbar.simulate.elements import Balls, Boxes, Cloth, Prop, Strands
+from pegbar.simulate.field_meshes import field_mesh
+from pegbar.simulate.fields import Puddle, SnowField
 from pegbar.simulate.finer import Finer, finer_sheet
 from pegbar.simulate.hulls import hull_triangles, hull_vertices, poses
 from pegbar.simulate.particle_meshes import particle_mesh
@@ -51,9 +53,12 @@ class Models:
         found: list[Mesh] = []
         for element in self._scene.elements:
             state = cache.read(element.name, frame)
+            number = self._scene.object_id(element.name)
             if isinstance(element, Particles):
-                number = self._scene.object_id(element.name)
                 found.append(particle_mesh(element, state, camera, self._scene.frame_rate, number))
+                continue
+            if isinstance(element, SnowField | Puddle):
+                found.append(field_mesh(element, state, self._scene.ground or 0.0, number))
                 continue
             positions = np.asarray(state["positions"], np.float64)
             found += self._of(element, positions, state.get("rotations"), camera)
@@ -74,7 +79,8 @@ class Models:
         if isinstance(element, Balls | Boxes):
             turns = np.tile([0.0, 0, 0, 1], (len(positions), 1)) if rotations is None else rotations
             return [_bodies(element, positions, np.asarray(turns, np.float64), number)]
-        return [Mesh(positions, element.triangles, np.array(element.look.color, np.float32), number)]
+        colors = np.array(element.look.color, np.float32) if element.colors is None else element.colors
+        return [Mesh(positions, element.triangles, colors, number)]
 
 
 def volume_meshes(scene: SimulationScene, frame: int, color: tuple[float, ...] = (0.4, 0.4, 0.4, 1.0)) -> list[Mesh]:

@@ -11,11 +11,27 @@ from pegbar.scene.camera import PerspectiveCamera
 from pegbar.simulate.elements import Element
 from pegbar.simulate.falling import Rain, Snow
 from pegbar.simulate.holding import Balloon, PomPoms, Rope, Tuft
+from pegbar.simulate.lying import FootPuddle, LyingSnow, Snowfall
 from pegbar.simulate.scene import Character
 from pegbar.simulate.standing import Clothesline, FloorBalls
+from pegbar.simulate.umbrella import Umbrella
 from pegbar.simulate.wearing import Scarves, Skirt
 
-Preset = Scarves | Skirt | Clothesline | FloorBalls | Snow | Rain | Rope | Balloon | PomPoms | Tuft
+Preset = (
+    Scarves
+    | Skirt
+    | Clothesline
+    | FloorBalls
+    | Snow
+    | Rain
+    | Umbrella
+    | LyingSnow
+    | FootPuddle
+    | Rope
+    | Balloon
+    | PomPoms
+    | Tuft
+)
 #: Presets that ask what the cameras see.
 SEEN = (Clothesline, Snow, Rain)
 PRESETS: Mapping[str, type[Preset]] = {
@@ -23,8 +39,11 @@ PRESETS: Mapping[str, type[Preset]] = {
     "skirt": Skirt,
     "clothesline": Clothesline,
     "balls": FloorBalls,
-    "snow": Snow,
+    "snow": Snowfall,
+    "snow_field": LyingSnow,
     "rain": Rain,
+    "umbrella": Umbrella,
+    "puddle": FootPuddle,
     "balloon": Balloon,
     "pompoms": PomPoms,
     "rope": Rope,

@@ -15,6 +15,7 @@ from pegbar import arrays
 from pegbar.scene.camera import PerspectiveCamera
 from pegbar.scene.volumes import TaperedCylinders
 from pegbar.simulate.elements import Cloth, Element, Pin, Prop, Strands
+from pegbar.simulate.fields import Puddle, SnowField
 from pegbar.simulate.materials import Wind
 from pegbar.simulate.weather import Particles
 
@@ -103,7 +104,7 @@ class SimulationScene:
         Frames a second.
     frames : int
         Number of frames.
-    elements : tuple of Cloth, Strands, Balls, Boxes, Prop or Particles
+    elements : tuple of Cloth, Strands, Balls, Boxes, Prop, Particles, SnowField or Puddle
         Their places count from 1 as object ids in the passes, those of particles from 65281.
     characters : tuple of Character
         Each with ``frames`` frames.
@@ -154,6 +155,8 @@ class SimulationScene:
                     f"characters: {character.name}: want {self.frames} frames, got {len(character.markers)}"
                 )
         for element in self.elements:
+            if isinstance(element, SnowField | Puddle) and self.ground is None:
+                raise ValueError(f"ground: {element.name} wants a ground to lie on")
             for pin in pins_of(element):
                 self._check_pin(element.name, pin)
 
