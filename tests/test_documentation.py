@@ -17,6 +17,7 @@ ROOT = Path(__file__).parents[1]
 MODULES = sorted(
     name
     for _, name, _ in pkgutil.walk_packages(pegbar.__path__, "pegbar.")
+    # What runs inside Blender imports bpy.
     if not name.endswith(("__main__", "._kernels")) and ".blender.inside." not in name
 )
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
