@@ -289,7 +289,7 @@ mod tests {
         let mut after = before.clone();
         bending.relax(&mut after);
         // M (x - x*) + h^2 sum of B / l * g (g . x) = 0 at every free point, with g = (1, -2, 1) / l.
-        let mut force = vec![DVec3::ZERO; 6];
+        let mut force = [DVec3::ZERO; 6];
         for (k, point) in points.iter().enumerate().skip(1).take(4) {
             let bow = (after[k - 1] - 2.0 * after[k] + after[k + 1]) * (point.bend / 0.1 / 0.01);
             for (at, g) in [(k - 1, 1.0), (k, -2.0), (k + 1, 1.0)] {

@@ -181,6 +181,10 @@ def test_a_clothesline_hangs_across_the_picture_where_its_end_would_be_seen():
     for cameras in ((), beside):
         line, *_ = preset_elements("clothesline", walker(24, speed=1.5), ground=0.0, cameras=cameras)
         assert np.ptp(line.vertices[:, 2]) > 5 * np.ptp(line.vertices[:, 0])
+    for eye in (5, -5):
+        cameras = (PerspectiveCamera.look_at((eye, 1, 0), (0, 1, 0), (96, 54), 0.8),)
+        line, *_ = preset_elements("clothesline", walker(24, speed=1.5), ground=0.0, cameras=cameras)
+        assert line.vertices[:, 0].mean() * eye < 0
     behind, before = (preset_elements("clothesline", figure, cameras=ahead, side=s)[0] for s in ("left", "right"))
     assert behind.vertices[:, 2].mean() < -0.1 < 0.1 < before.vertices[:, 2].mean()
     # The arms swing too little to brush what hangs behind; swung farther they do.

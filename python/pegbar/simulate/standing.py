@@ -165,10 +165,11 @@ class Clothesline(Fabric):
             if not goes or abs(along @ seen_from) > ENDWISE:
                 along = np.cross((0.0, 1.0, 0.0), seen_from)
         left = np.cross((0.0, 1.0, 0.0), along)
-        side = self.side
-        if side is None:
-            side = "left" if self._distance(character, center, left) >= REACH * tall else "right"
-        return center, along, left if side == "left" else -left
+        if self.side is not None:
+            return center, along, left if self.side == "left" else -left
+        # Behind the character in the picture, so that it is not hidden.
+        behind = -left if cameras and left @ cameras[0].matrix[2, :3] < 0 else left
+        return center, along, behind if self._distance(character, center, behind) >= REACH * tall else -behind
 
     def _distance(self, character: Character, center: Floats, out: Floats) -> float:
         """How far a hand reaches out to the line's side, less a little, so that it brushes the washing."""
