@@ -297,12 +297,9 @@ fn check(
     let capsules = drive.capsules.len() / (drive.substeps + 1);
     check_length("capsules", capsules * (drive.substeps + 1), drive.capsules.len())?;
     check_length("ends", count, strands.ends.last().map_or(0, |end| *end as usize))?;
-    let mut before = 0;
-    for (index, end) in strands.ends.iter().enumerate() {
-        if *end <= before {
-            return Err(KernelError::Item { argument: "ends", problem: "want a point and more by strand", index });
-        }
-        before = *end;
+    let starts = std::iter::once(&0).chain(strands.ends);
+    if let Some(index) = strands.ends.iter().zip(starts).position(|(end, start)| end <= start) {
+        return Err(KernelError::Item { argument: "ends", problem: "want a point and more by strand", index });
     }
     for (argument, list) in [("pins", drive.pins), ("bobs", strands.bobs)] {
         if let Some(index) = list.iter().position(|point| *point as usize >= count) {

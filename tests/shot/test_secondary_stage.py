@@ -176,7 +176,7 @@ def test_two_characters_are_put_in_one_scene_and_one_picture(made, tmp_path):
 
 
 def test_engines_run_bodies_before_cloth_and_what_falls_on_both_last():
-    assert [engine.name for engine in secondary_stage.ENGINES] == ["rapier", "cloth", "particles"]
+    assert [engine.name for engine in secondary_stage.ENGINES] == ["rapier", "cloth", "strands", "particles"]
 
 
 def test_frames_are_nearly_the_same_without_passes(made):
