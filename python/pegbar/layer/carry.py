@@ -90,12 +90,22 @@ def moving_average(markers: ArrayLike, window: int) -> Floats:
 
 
 def _straight(marks: Floats, there: Flags) -> Floats:
-    """Linear in time between marks, held before the first and after the last."""
+    """Linear in time between marks, held before the first and after the last.
+
+    A marker that some of the drawings with marks lack keeps its place to the others there: a figure that walks on takes
+    a hidden elbow along.
+    """
     moments, carried = np.arange(len(marks)), np.full(marks.shape, np.nan)
-    for marker in np.flatnonzero(there.any(axis=0)):
+    steady = there[there.any(axis=1)].all(axis=0)
+    body = np.zeros((len(marks), 2))
+    for marker in (*np.flatnonzero(steady), *np.flatnonzero(there.any(axis=0) & ~steady)):
         keys = moments[there[:, marker]]
+        origin = np.zeros_like(body) if steady[marker] else body
         for axis in range(2):
-            carried[:, marker, axis] = np.interp(moments, keys, marks[keys, marker, axis])
+            way = np.interp(moments, keys, marks[keys, marker, axis] - origin[keys, axis])
+            carried[:, marker, axis] = way + origin[:, axis]
+        if steady[marker]:
+            body += carried[:, marker] / steady.sum()
     return carried
 
 
