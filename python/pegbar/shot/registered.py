@@ -194,7 +194,7 @@ class _Drawn:
 
     def warped(self, seen: Floats, moments: Floats) -> Floats:
         """The columns (F,) of ``moments`` that a time warp finds for poses (G, N, 2) as all drawings see them."""
-        cost = self._costs(slice(None), *(part[::_FINE] for part in self._poses(seen)))
+        cost = self._costs(slice(None), seen[::_FINE], limb_trust(seen, self.limbs)[::_FINE])
         if cost.shape[1] * _SLOPE < len(cost):
             shown = f"{moments[0]:.0f} to {moments[-1]:.0f}"
             raise ValueError(f"clip.start, clip.stop: frames {shown} are too few for {len(cost)} drawings")
@@ -210,20 +210,18 @@ class _Drawn:
         first, width = _near(columns, len(moments))
         cost, near = np.empty((len(columns), -(-len(moments) // _FINE))), np.empty((len(columns), width))
         for part, seen in views:
-            angle, trust = self._poses(seen)
-            cost[part] = self._costs(part, angle[::_FINE], trust[::_FINE])
+            trust = limb_trust(seen, self.limbs)
+            cost[part] = self._costs(part, seen[::_FINE], trust[::_FINE])
             for row in range(len(columns))[part]:
                 here = slice(first[row], first[row] + width)
-                near[row] = self._costs(slice(row, row + 1), angle[here], trust[here])
+                near[row] = self._costs(slice(row, row + 1), seen[here], trust[here])
         columns = _settled(near, first, len(moments) - 1, columns, self.holds)
         times = np.interp(columns, np.arange(len(moments)), moments)
         return Retiming(cost, moments[::_FINE], _as_warp(cost, columns / _FINE), times)
 
-    def _poses(self, seen: Floats) -> tuple[Floats, Floats]:
-        return pose_descriptor(seen, self.limbs), limb_trust(seen, self.limbs)
-
-    def _costs(self, part: slice, angle: Floats, trust: Floats) -> Floats:
-        return pose_distance(self.angles[part], angle, a_trust=self.trust[part], b_trust=trust)
+    def _costs(self, part: slice, seen: Floats, trust: Floats) -> Floats:
+        angles = pose_descriptor(seen, self.limbs)
+        return pose_distance(self.angles[part], angles, a_trust=self.trust[part], b_trust=trust)
 
 
 def _near(columns: Floats, count: int) -> tuple[NDArray[np.intp], int]:
