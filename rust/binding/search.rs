@@ -15,6 +15,9 @@ type Sequence<'py> =
 /// Costs and end frames, (blocks, views x labellings x orders).
 type Best<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u32>>);
 
+/// Sums of ways (G,) and the steps that led there (n, G).
+type Ways<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<u16>>);
+
 #[pyfunction]
 pub fn search_clips<'py>(
     py: Python<'py>,
@@ -48,9 +51,8 @@ pub fn segment_rows<'py>(
     costs: PyReadonlyArray2<'py, f64>,
     steps: PyReadonlyArray2<'py, u32>,
     before: PyReadonlyArray1<'py, f64>,
-) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<u16>>)> {
-    let rows: (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<u16>>) =
-        (empty(py, [before.shape()[0]])?, empty(py, [costs.shape()[0], costs.shape()[1]])?);
+) -> PyResult<Ways<'py>> {
+    let rows: Ways<'py> = (empty(py, [before.shape()[0]])?, empty(py, [costs.shape()[0], costs.shape()[1]])?);
     let (mut sums, mut taken) = (rows.0.readwrite(), rows.1.readwrite());
     sums.as_slice_mut()?.copy_from_slice(slice("before", &before)?);
     let (costs, steps) = (slice("costs", &costs)?, grouped("steps", &steps)?);
