@@ -39,7 +39,7 @@ __all__ = [
     "resolve_passes",
     "rim_depth",
     "search_clips",
-    "segment_path",
+    "segment_rows",
     "segment_stick_figure",
     "step_cloth",
     "step_particles",
@@ -161,7 +161,9 @@ def search_clips(
     drawn: tuple[_Floats, _Floats, NDArray[np.uint32], NDArray[np.uint32]],
     block: int,
 ) -> tuple[_Floats, NDArray[np.uint32]]: ...
-def segment_path(costs: _Doubles, steps: NDArray[np.uint32]) -> tuple[NDArray[np.uint32], float]: ...
+def segment_rows(
+    costs: _Doubles, steps: NDArray[np.uint32], before: _Doubles
+) -> tuple[_Doubles, NDArray[np.uint16]]: ...
 def capsule_distances(points: _Doubles, capsules: _Doubles) -> tuple[_Doubles, NDArray[np.uint32]]: ...
 def step_cloth(
     made: tuple[_Doubles, _Indices, _Indices, _Doubles, _Indices, _Doubles, _Indices, _Doubles, _Indices, _Doubles],

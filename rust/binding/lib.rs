@@ -85,7 +85,7 @@ mod _kernels {
     #[pymodule_export]
     use crate::rim::rim_depth;
     #[pymodule_export]
-    use crate::search::{search_clips, segment_path};
+    use crate::search::{search_clips, segment_rows};
     #[pymodule_export]
     use crate::segment::segment_stick_figure;
     #[pymodule_export]

@@ -2,7 +2,9 @@
 
 use crate::arrays::{empty, grouped, slice};
 use crate::errors::to_python;
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use numpy::{
+    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
+};
 use pegbar_kernels::search::{self, Clips, Drawn, Found};
 use pyo3::prelude::*;
 
@@ -12,6 +14,9 @@ type Sequence<'py> =
 
 /// Costs and end frames, (blocks, views x labellings x orders).
 type Best<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u32>>);
+
+/// Sums of ways (G,) and the steps that led there (n, G).
+type Ways<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<u16>>);
 
 #[pyfunction]
 pub fn search_clips<'py>(
@@ -39,16 +44,20 @@ pub fn search_clips<'py>(
     Ok(best)
 }
 
+/// The sums (G,) of the ways through the next rows, and the steps taken (n, G).
 #[pyfunction]
-pub fn segment_path<'py>(
+pub fn segment_rows<'py>(
     py: Python<'py>,
     costs: PyReadonlyArray2<'py, f64>,
     steps: PyReadonlyArray2<'py, u32>,
-) -> PyResult<(Bound<'py, PyArray1<u32>>, f64)> {
-    let path: Bound<'py, PyArray1<u32>> = empty(py, [costs.shape()[0]])?;
-    let mut target = path.readwrite();
-    let (costs, steps, frames) = (slice("costs", &costs)?, grouped("steps", &steps)?, target.as_slice_mut()?);
-    let total = py.detach(|| search::segment_path(costs, steps, frames)).map_err(to_python)?;
-    drop(target);
-    Ok((path, total))
+    before: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Ways<'py>> {
+    let rows: Ways<'py> = (empty(py, [before.shape()[0]])?, empty(py, [costs.shape()[0], costs.shape()[1]])?);
+    let (mut sums, mut taken) = (rows.0.readwrite(), rows.1.readwrite());
+    sums.as_slice_mut()?.copy_from_slice(slice("before", &before)?);
+    let (costs, steps) = (slice("costs", &costs)?, grouped("steps", &steps)?);
+    let (reached, moved) = (sums.as_slice_mut()?, taken.as_slice_mut()?);
+    py.detach(|| search::segment_rows(costs, steps, reached, moved)).map_err(to_python)?;
+    drop((sums, taken));
+    Ok(rows)
 }

@@ -234,44 +234,30 @@ fn keep_best(row: &[f32], start: usize, block: usize, found: &mut [Found], strid
     }
 }
 
-/// The cheapest way through a table of costs, drawn frames by clip frames, open at both ends of the clip.
+/// Goes on with the cheapest ways through a table of costs, drawn frames by clip frames, by its next rows `costs`.
 ///
-/// Writes the clip frame of every drawn frame and returns the sum of costs; +inf, and nothing written, where no way fits.
-/// `steps` are as in [`Drawn`]. Ties go to the earlier end and to the smaller step.
-pub fn segment_path(costs: &[f64], steps: &[[u32; 2]], path: &mut [u32]) -> Result<f64, KernelError> {
-    let frames = steps.len();
-    if frames == 0 {
-        return Err(KernelError::Argument { argument: "steps", problem: "want a frame" });
-    }
-    check_length("path", frames, path.len())?;
-    let length = costs.len() / frames;
-    check_length("costs", frames * length, costs.len())?;
-    let mut sums = costs.to_vec();
-    let mut taken = vec![0_u32; costs.len()];
-    for frame in 1..frames {
-        let (done, open) = sums.split_at_mut(frame * length);
-        let (before, row) = (&done[(frame - 1) * length..], &mut open[..length]);
-        for (column, sum) in row.iter_mut().enumerate() {
-            let (cost, step) = cheapest(before, column, steps[frame]);
-            *sum += cost;
-            taken[frame * length + column] = step;
+/// `sums` are those of the ways to each clip frame so far, before the first row zeros, and become those through these
+/// rows; `taken` gets each cell's step from the row before. Steps are as in [`Drawn`], the first frame's none, and at
+/// most 65535; ties go to the smaller one.
+pub fn segment_rows(costs: &[f64], steps: &[[u32; 2]], sums: &mut [f64], taken: &mut [u16]) -> Result<(), KernelError> {
+    let length = sums.len();
+    check_length("costs", steps.len() * length, costs.len())?;
+    check_length("taken", costs.len(), taken.len())?;
+    let mut before = vec![0.0; length];
+    for ((row, taken), steps) in costs.chunks(length.max(1)).zip(taken.chunks_mut(length.max(1))).zip(steps) {
+        before.copy_from_slice(sums);
+        for (column, (cost, taken)) in row.iter().zip(taken).enumerate() {
+            let (sum, step) = cheapest(&before, column, *steps);
+            (sums[column], *taken) = (cost + sum, step as u16);
         }
     }
-    let last = &sums[(frames - 1) * length..];
-    let ends = (0..length).filter(|column| last[*column] < f64::INFINITY);
-    let Some(end) = ends.min_by(|a, b| last[*a].total_cmp(&last[*b])) else { return Ok(f64::INFINITY) };
-    let mut column = end;
-    for frame in (0..frames).rev() {
-        path[frame] = column as u32;
-        column -= taken[frame * length + column] as usize;
-    }
-    Ok(last[end])
+    Ok(())
 }
 
 /// The cheapest of the places a path may come from, and how far back it lies.
 fn cheapest(before: &[f64], column: usize, [low, high]: [u32; 2]) -> (f64, u32) {
     let mut best = (f64::INFINITY, 0);
-    for step in low..=high.min(column as u32) {
+    for step in low..=high.min(column as u32).min(u16::MAX.into()) {
         if let Some(sum) = column.checked_sub(step as usize).and_then(|from| before.get(from))
             && *sum < best.0
         {
@@ -388,11 +374,14 @@ mod tests {
     }
 
     #[test]
-    fn the_path_is_the_cheapest_of_all() {
+    fn ways_are_the_cheapest_of_all_and_go_on_where_rows_ended() {
         let costs = [3.0, 1.0, 4.0, 1.0, 5.0, 9.0, 2.0, 6.0, 5.0, 3.0, 5.0, 8.0];
-        let mut path = [0; 3];
-        let found = segment_path(&costs, &[[0, 0], [1, 2], [0, 1]], &mut path);
-        assert_eq!((found, path), (Ok(1.0 + 2.0 + 5.0), [1, 2, 2]));
-        assert_eq!(segment_path(&costs, &[[0, 0], [3, 3], [1, 1]], &mut path), Ok(f64::INFINITY));
+        let steps = [[0, 0], [1, 2], [0, 1]];
+        let (mut sums, mut taken) = ([0.0; 4], [9; 12]);
+        assert_eq!(segment_rows(&costs[..8], &steps[..2], &mut sums, &mut taken[..8]), Ok(()));
+        assert_eq!(segment_rows(&costs[8..], &steps[2..], &mut sums, &mut taken[8..]), Ok(()));
+        assert_eq!(sums, [f64::INFINITY, 3.0 + 9.0 + 3.0, 1.0 + 2.0 + 5.0, 1.0 + 2.0 + 8.0]);
+        assert_eq!((taken[10], taken[6], taken[7], taken[11]), (0, 1, 2, 1));
+        assert!(segment_rows(&costs, &steps[1..], &mut sums, &mut taken).is_err());
     }
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,8 @@ _RATE, _VIEW_RATE, _DRAWN_RATE = 120.0, 60.0, 12.5
 # Degrees by which the view is moved, in turn, until no neighbour is better.
 _TURNS = (15.0, 7.5, 3.75, 1.5, 0.75)
 _LOWEST, _HIGHEST = -45.0, 60.0
+# Drawings whose costs are held at once: all of a long shot's would be hundreds of megabytes.
+_ROWS = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +88,7 @@ class Refiner:
 
     def _align(self, clip: Clip, candidate: Candidate, camera: OrthographicCamera) -> tuple[Floats, float]:
         """Times (F,) in clip frames on the cheapest path, and its mean angle in radians."""
-        marks, exchanged = self.marks, candidate.exchanged
+        marks = self.marks
         drawings = np.arange(marks.angles.shape[1])
         ways = []
         for turn in self._turns(candidate):
@@ -93,14 +96,21 @@ class Refiner:
             ways.append((order, marks.steps(order, candidate.which, _RATE, self.speed)))
         window = _Window(clip, candidate.end, max(int(steps[:, 1].sum()) for _, steps in ways), _RATE)
         projected = pose_descriptor(camera.project(window.markers), marks.pairs)
-        table = pose_distance(marks.angles[exchanged], projected, weights=marks.weights, a_trust=marks.trust[exchanged])
         times, best = np.zeros(len(drawings)), np.inf
         for order, steps in ways:
-            path, cost = _kernels.segment_path(table[order], steps)
+            path, cost = cheapest_path(self._costs(candidate, projected, order), steps, len(projected))
             if cost < best:
                 best = cost
                 times[order] = window.times[path]
         return times, best / (marks.weights.sum() * len(drawings))
+
+    def _costs(self, candidate: Candidate, projected: Floats, order: NDArray[np.intp]) -> Iterator[Floats]:
+        """The costs (n, G) of a few drawings at a time and all poses of the clip."""
+        marks, exchanged = self.marks, candidate.exchanged
+        for start in range(0, len(order), _ROWS):
+            rows = order[start : start + _ROWS]
+            angles, trust = marks.angles[exchanged, rows], marks.trust[exchanged, rows]
+            yield pose_distance(angles, projected, weights=marks.weights, a_trust=trust)
 
     def _turns(self, candidate: Candidate) -> list[int]:
         """Drawings at which a cycle may begin: the first pass tries only some of them."""
@@ -109,6 +119,29 @@ class Refiner:
             return [candidate.turn]
         reach = -(-count // TURNS)
         return sorted({(candidate.turn + turn) % count for turn in range(-reach, reach + 1)})
+
+
+def cheapest_path(parts: Iterable[Floats], steps: NDArray[np.uint32], length: int) -> tuple[NDArray[np.intp], float]:
+    """The clip frame of every drawing (F,) on the cheapest path, and the sum of its costs; +inf where none fits.
+
+    ``parts`` are the rows of costs (F, ``length``), some at a time; ``steps`` (F, 2) the least and most clip frames
+    from the drawing before, 0 for the first. The path may begin and end at any clip frame.
+    """
+    sums, taken = np.zeros(length), []
+    row = 0
+    for costs in parts:
+        sums, moved = _kernels.segment_rows(costs, steps[row : row + len(costs)], sums)
+        taken.append(moved)
+        row += len(costs)
+    column = int(sums.argmin())
+    cost, path = float(sums[column]), np.zeros(row, np.intp)
+    if np.isfinite(cost):
+        for moved in reversed(taken):
+            for step in moved[::-1]:
+                row -= 1
+                path[row] = column
+                column -= int(step[column])
+    return path, cost
 
 
 class _Window:

@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+# Rows and columns of costs that are drawn at most.
+_FINEST = 1000
+
+
 def warp_picture(
     cost: ArrayLike,
     warp: TimeWarp,
@@ -64,8 +68,10 @@ def _draw(figure: Figure, table: NDArray[np.float64], warp: TimeWarp, clip: tupl
     offset, step = clip
     drawn = np.arange(len(table))
     low, high = offset - step / 2, offset + step * (table.shape[1] - 0.5)
+    # Of a long shot's costs more than the picture has pixels would only take memory.
+    thin = tuple(slice(None, None, -(-count // _FINEST)) for count in table.shape)
     shown = above.imshow(
-        table.T, origin="lower", aspect="auto", cmap="gray", extent=(-0.5, len(table) - 0.5, low, high)
+        table[thin].T, origin="lower", aspect="auto", cmap="gray", extent=(-0.5, len(table) - 0.5, low, high)
     )
     figure.colorbar(shown, ax=above, label="cost of a pair")
     above.plot(warp.path[:, 0], offset + step * warp.path[:, 1], color="tab:blue", label="path")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -107,18 +107,23 @@ def register_clip(
     poses = sample_markers(clip.markers(marks.names), moments, rest_frame=clip.rest_frame)
     parallel = OrthographicCamera.from_angles(view.azimuth, view.elevation)
     seen = parallel.project(poses)
-    columns = None if view.times is None else np.interp(view.times, moments, np.arange(len(moments)))
-    retiming = _retimed(marks, [seen], moments, columns)
+    drawn = _Drawn.of(marks)
+    if view.times is None:
+        columns = drawn.warped(seen, moments)
+    else:
+        columns = np.interp(view.times, moments, np.arange(len(moments)))
+    times = drawn.retimed([(slice(None), seen)], moments, columns).times
     figure = _Figure(marks, clip, rate, options)
-    body = figure.body(retiming)
+    body = figure.body(times)
     rays = np.broadcast_to(parallel.rotation[:2], (*body.points.shape[:2], 2, 3))
     track, own = figure.first_track(body, rays)
     middles = np.nanmean(track.points, axis=1)
     shapes = poses - np.nanmean(poses, axis=1, keepdims=True)
-    views = [camera.project(shapes + middle) for camera, middle in zip(track.cameras, middles, strict=True)]
-    columns = np.interp(retiming.times, moments, np.arange(len(moments)))
-    retiming = _retimed(marks, views, moments, columns)
-    body = figure.body(retiming)
+    # One at a time: all drawings' views of all poses would be gigabytes for a long shot.
+    seen_by = enumerate(zip(track.cameras, middles, strict=True))
+    views = ((slice(row, row + 1), camera.project(shapes + middle)) for row, (camera, middle) in seen_by)
+    retiming = drawn.retimed(views, moments, np.interp(times, moments, np.arange(len(moments))))
+    body = figure.body(retiming.times)
     jacobians = jacobians_of(track.matrices, track.points)
     proportions = own_proportions(body) if own else figure.proportions(body, jacobians)
     track = figure.track(body, proportions, options)
@@ -137,9 +142,9 @@ class _Figure:
     rate: float
     options: CameraOptions
 
-    def body(self, retiming: Retiming) -> Body:
-        """The clip's markers at the drawings' times."""
-        moved = retime(self.clip, retiming.times, frame_rate=self.rate, root_smoothing=self.options.root_smoothing)
+    def body(self, times: Floats) -> Body:
+        """The clip's markers at the drawings' ``times`` (F,)."""
+        moved = retime(self.clip, times, frame_rate=self.rate, root_smoothing=self.options.root_smoothing)
         return Body(self.marks.names, moved.markers(self.marks.names), self.rate)
 
     def first_track(self, body: Body, rays: Floats) -> tuple[CameraTrack, bool]:
@@ -171,30 +176,58 @@ class _Figure:
         )
 
 
-def _retimed(marks: Marks, views: Sequence[Floats], moments: Floats, columns: Floats | None) -> Retiming:
-    """The clip retimed to the drawings, near ``columns`` of ``moments`` or else by a time warp.
+@dataclass(frozen=True, eq=False)
+class _Drawn:
+    """The drawn limbs (K, 2) as marks, their angles and how far these are to be trusted (F, K), and the holds (F,)."""
 
-    ``views`` are its poses (G, N, 2) as one or all of the drawings see them.
-    """
-    limbs = [(marks.names.index(limb.start), marks.names.index(limb.end)) for limb in limbs_between(marks.names)]
-    drawn = np.where(marks.seen[..., None], marks.places, np.nan)
-    angles, trust = pose_descriptor(drawn, limbs), limb_trust(drawn, limbs)
-    rows = []
-    for part, seen in zip(np.array_split(np.arange(len(drawn)), len(views)), views, strict=True):
-        clip_trust = limb_trust(seen, limbs)
-        angle = pose_descriptor(seen, limbs)
-        rows.append(pose_distance(angles[part], angle, a_trust=trust[part], b_trust=clip_trust))
-    fine = np.concatenate(rows)
-    cost = np.ascontiguousarray(fine[:, ::_FINE])
-    if columns is None:
+    limbs: list[tuple[int, int]]
+    angles: Floats
+    trust: Floats
+    holds: Floats
+
+    @classmethod
+    def of(cls, marks: Marks) -> _Drawn:
+        """The limbs of ``marks``, as far as these are seen."""
+        limbs = [(marks.names.index(limb.start), marks.names.index(limb.end)) for limb in limbs_between(marks.names)]
+        drawn = np.where(marks.seen[..., None], marks.places, np.nan)
+        return cls(limbs, pose_descriptor(drawn, limbs), limb_trust(drawn, limbs), marks.holds)
+
+    def warped(self, seen: Floats, moments: Floats) -> Floats:
+        """The columns (F,) of ``moments`` that a time warp finds for poses (G, N, 2) as all drawings see them."""
+        cost = self._costs(slice(None), seen[::_FINE], limb_trust(seen, self.limbs)[::_FINE])
         if cost.shape[1] * _SLOPE < len(cost):
             shown = f"{moments[0]:.0f} to {moments[-1]:.0f}"
             raise ValueError(f"clip.start, clip.stop: frames {shown} are too few for {len(cost)} drawings")
-        warp = time_warp(cost, open_begin=True, open_end=True, slope_limit=_SLOPE, holds=marks.holds)
-        columns = warp.times * _FINE
-    columns = _settled(fine, columns, marks.holds)
-    times = np.interp(columns, np.arange(len(moments)), moments)
-    return Retiming(cost, moments[::_FINE], _as_warp(cost, columns / _FINE), times)
+        warp = time_warp(cost, open_begin=True, open_end=True, slope_limit=_SLOPE, holds=self.holds)
+        return warp.times * _FINE
+
+    def retimed(self, views: Iterable[tuple[slice, Floats]], moments: Floats, columns: Floats) -> Retiming:
+        """The clip retimed to the drawings, near ``columns`` (F,) of ``moments``.
+
+        ``views`` are the clip's poses (G, N, 2) as some of the drawings see them, one after the other. All of the
+        poses but few are compared about each drawing's time only.
+        """
+        first, width = _near(columns, len(moments))
+        cost, near = np.empty((len(columns), -(-len(moments) // _FINE))), np.empty((len(columns), width))
+        for part, seen in views:
+            trust = limb_trust(seen, self.limbs)
+            cost[part] = self._costs(part, seen[::_FINE], trust[::_FINE])
+            for row in range(len(columns))[part]:
+                here = slice(first[row], first[row] + width)
+                near[row] = self._costs(slice(row, row + 1), seen[here], trust[here])
+        columns = _settled(near, first, len(moments) - 1, columns, self.holds)
+        times = np.interp(columns, np.arange(len(moments)), moments)
+        return Retiming(cost, moments[::_FINE], _as_warp(cost, columns / _FINE), times)
+
+    def _costs(self, part: slice, seen: Floats, trust: Floats) -> Floats:
+        angles = pose_descriptor(seen, self.limbs)
+        return pose_distance(self.angles[part], angles, a_trust=self.trust[part], b_trust=trust)
+
+
+def _near(columns: Floats, count: int) -> tuple[NDArray[np.intp], int]:
+    """The first (F,) of the columns that `_settled` looks at for each drawing, and how many they are."""
+    width = min(2 * _FINE + 3, count)
+    return np.clip(np.rint(columns) - _FINE - 1, 0, count - width).astype(np.intp), width
 
 
 def _as_warp(cost: Floats, columns: Floats) -> TimeWarp:
@@ -204,17 +237,18 @@ def _as_warp(cost: Floats, columns: Floats) -> TimeWarp:
     return TimeWarp(path, float(cost[path[:, 0], path[:, 1]].sum()), frames, columns)
 
 
-def _settled(cost: Floats, times: Floats, holds: Floats) -> Floats:
-    """Times (F,) near ``times``, in columns of ``cost``, that are cheap and run smoothly.
+def _settled(cost: Floats, first: NDArray[np.intp], last: int, times: Floats, holds: Floats) -> Floats:
+    """Times (F,) near ``times``, in columns up to ``last``, that are cheap and run smoothly.
 
-    Each drawing's cost is taken for a parabola about its cheapest column near by; where it is flat, neighbours decide.
+    ``cost`` has each drawing's columns from ``first`` (F,) on. It is taken for a parabola about the cheapest column
+    near by; where it is flat, neighbours decide.
     """
-    rows, last = np.arange(len(cost)), cost.shape[1] - 1
     if last < 2:
         return times
+    rows = np.arange(len(cost))
     near = np.clip(np.rint(times)[:, None] + np.arange(-_FINE, _FINE + 1), 1, last - 1).astype(np.intp)
-    best = near[rows, np.argmin(cost[rows[:, None], near], axis=1)]
-    before, here, after = (cost[rows, best + step] for step in (-1, 0, 1))
+    best = near[rows, np.argmin(cost[rows[:, None], near - first[:, None]], axis=1)]
+    before, here, after = (cost[rows, best - first + step] for step in (-1, 0, 1))
     bend = np.maximum(before - 2 * here + after, 1e-6)
     lowest = best + np.clip((before - after) / (2 * bend), -1, 1)
     return smooth_weighted(lowest, bend, holds[:-1], _STIFFNESS).clip(0, last)
