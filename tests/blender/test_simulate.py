@@ -10,11 +10,12 @@ from pegbar.simulate.blender.engine import BlenderEngine
 from pegbar.simulate.blender.locate import Blender
 from pegbar.simulate.cache import MemoryCache
 from pegbar.simulate.cloth import ClothEngine
-from pegbar.simulate.elements import Balls, Boxes, Cloth, Pin, Prop
+from pegbar.simulate.elements import Balls, Boxes, Cloth, Pin, Prop, Strands
 from pegbar.simulate.engine import simulate_scene
 from pegbar.simulate.materials import Wind
-from pegbar.simulate.measures import measure_cloth
+from pegbar.simulate.measures import measure_cloth, measure_strands
 from pegbar.simulate.scene import Character, PreRoll, SimulationScene
+from pegbar.simulate.strands import StrandEngine
 
 STILL = PreRoll(0, 0)
 
@@ -139,6 +140,29 @@ def test_wind_blows_a_cloth_as_far_as_our_engine_does_within_a_factor(blender: B
         leaned[name] = track(cache, "flag", 24)[-8:, -6:, 2].mean()
     assert leaned["ours"] > 0.05
     assert 0.4 < leaned["theirs"] / leaned["ours"] < 2.5
+
+
+def test_strands_swing_as_ours_and_lie_over_a_limb(blender: Blender) -> None:
+    along = np.arange(30) * 0.04
+    zero = np.zeros(30)
+    swings = np.stack([along, zero + 1.5, zero + 0.6], 1)
+    lies = np.stack([zero + 0.1, zero + 0.75, along - 0.58], 1)
+    count, radius, pin = np.array([30]), np.array([0.01]), Pin("world", vertices=np.arange(2))
+    strands = (Strands("swings", swings, count, radius, (pin,)), Strands("lies", lies, count, radius))
+    bar = post(20, start=(-0.6, 0.6, 0), end=(0.6, 0.6, 0))
+    found = {}
+    for name, engine in (("ours", StrandEngine()), ("theirs", BlenderEngine(blender))):
+        scene = SimulationScene(24, 20, strands, (bar,), ground=0.0, pre_roll=STILL, wind=Wind((0, 0, 3.0), 0.0))
+        cache = MemoryCache()
+        simulate_scene(scene, cache, [engine])
+        found[name] = track(cache, "swings", 20)
+    assert np.abs(found["ours"][:10] - found["theirs"][:10]).max() < 0.05
+    assert np.abs(found["theirs"][:, :2] - swings[:2]).max() < 1e-4
+    for name in ("swings", "lies"):
+        measures = measure_strands(scene, cache, name)
+        assert measures.penetration.max() < 5e-3
+        assert np.abs(measures.stretch).max() < 0.03
+    assert track(cache, "lies", 20)[-1, :, 1].max() == pytest.approx(0.71, abs=0.02)
 
 
 def test_the_same_bits_every_time_and_a_run_that_is_taken_up(blender: Blender) -> None:
