@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pegbar.errors import BlenderError
 from pegbar.simulate.blender.cloth import cloth_entry, colliders
 from pegbar.simulate.blender.locate import Blender
+from pegbar.simulate.blender.particles import Tell, simulate_particles
 from pegbar.simulate.blender.process import INSIDE, run_blender
 from pegbar.simulate.blender.strands import strands_entry
 from pegbar.simulate.cache import Cache
@@ -24,6 +25,7 @@ from pegbar.simulate.engine import Progress, refuse_explosion
 from pegbar.simulate.hulls import hull_triangles, hull_vertices, poses
 from pegbar.simulate.scene import SimulationScene
 from pegbar.simulate.tracks import Volumes, pin_track
+from pegbar.simulate.weather import Particles
 
 Floats = NDArray[np.float64]
 Arrays = dict[str, NDArray[Any]]
@@ -33,7 +35,7 @@ THINNEST = 1e-3
 
 @dataclass(frozen=True)
 class BlenderEngine:
-    """Simulates cloth, strands and bodies in ``blender``, a frame in ``rigid_substeps`` or ``cloth_substeps`` steps.
+    """Simulates cloth, strands, bodies and particles in ``blender``, with ``rigid_substeps`` and ``cloth_substeps``.
 
     Bodies come first, then one cloth after the other: it meets the limbs, props, bodies and the ground, and with
     ``self_collision`` itself. Blender cannot go on from a frame: a run that is taken up begins anew and writes what
@@ -47,12 +49,14 @@ class BlenderEngine:
     name: str = "blender"
 
     def supports(self, element: Element) -> bool:
-        """Whether ``element`` is cloth, a prop, strands without bobs, or bodies at rest.
+        """Whether ``element`` is cloth, a prop, strands without bobs, falling particles, or bodies at rest.
 
         Blender knows no speed that a body begins with, and a cloth's vertices have one mass.
         """
         if isinstance(element, Balls | Boxes):
             return not element.velocities.any()
+        if isinstance(element, Particles):
+            return element.count > 0
         return isinstance(element, Cloth | Prop) or (isinstance(element, Strands) and element.bobs is None)
 
     def run(
@@ -64,11 +68,15 @@ class BlenderEngine:
                 cache.write(prop.name, frame, {"positions": places})
         bodies = [element for element in elements if isinstance(element, Balls | Boxes)]
         cloths = [element for element in elements if isinstance(element, Cloth | Strands)]
-        steps = bool(bodies) + bool(cloths)
+        particles = [element for element in elements if isinstance(element, Particles)]
+        steps = bool(bodies) + bool(cloths) + bool(particles)
         if bodies:
             self._simulate(scene, bodies, [], cache, start, progress, (0, steps))
         if cloths:
             self._simulate(scene, [], cloths, cache, start, progress, (int(bool(bodies)), steps))
+        if particles:
+            tell = self._teller(scene, progress, (steps - 1, steps))
+            simulate_particles(scene, particles, cache, start, self.blender, tell)
 
     def _simulate(
         self,
@@ -82,10 +90,7 @@ class BlenderEngine:
     ) -> None:
         """Have Blender simulate one kind, and put its frames into the cache."""
 
-        def tell(done: int, total: int) -> None:
-            if progress is not None:
-                progress(self.name, round(scene.frames * (part[0] + done / max(total, 1)) / part[1]), scene.frames)
-
+        tell = self._teller(scene, progress, part)
         with tempfile.TemporaryDirectory(prefix="pegbar-blender-") as place:
             folder = Path(place)
             # Elements' names are kept out of file names.
@@ -98,6 +103,15 @@ class BlenderEngine:
             run_blender(self.blender, INSIDE / "simulate.py", [place], outputs=outputs, progress=tell)
             for element, path in zip((*bodies, *cloths), outputs, strict=True):
                 store(scene, element, read_result(path, scene, element), cache, start)
+
+    def _teller(self, scene: SimulationScene, progress: Progress | None, part: tuple[int, int]) -> Tell:
+        """Return what is told of a part's steps, and tells of all frames."""
+
+        def tell(done: int, total: int) -> None:
+            if progress is not None:
+                progress(self.name, round(scene.frames * (part[0] + done / max(total, 1)) / part[1]), scene.frames)
+
+        return tell
 
     def _job(
         self,
