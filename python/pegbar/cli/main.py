@@ -93,10 +93,10 @@ contact sheet and a report.
 Example: pegbar secondary demo/shot.toml
 
 Example: pegbar secondary demo/shot.toml --frames 1-4""",
-    "effects": """List the effects: what each preset of secondary motion makes, and its settings.
+    "effects": """List the presets of secondary motion.
 
-With a name all settings of that one, with their defaults. With --gallery a picture of each, on the sample shot or on
-your own.
+What each makes; with a name all settings of that one, with their defaults. With --gallery a picture of each, on the
+sample shot or on your own.
 
 Example: pegbar effects
 

@@ -10,7 +10,7 @@ SECTIONS = {
     "The clip": ("match", "motion"),
     "The joints": ("dots", "align"),
     "Three jobs": ("secondary", "lift", "animate"),
-    "Pictures": ("depth", "composite"),
+    "Pictures": ("effects", "depth", "composite"),
     "Exchange": ("export", "import-passes"),
     "Results": ("report", "reproduce"),
 }

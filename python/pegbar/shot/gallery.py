@@ -1,8 +1,12 @@
-"""A picture of every effect on a shot: each preset as its defaults make it, simulated and composited by itself."""
+"""A picture of every effect on a shot: each preset as its defaults make it, simulated and composited by itself.
+
+An umbrella is shown in the rain.
+"""
 
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -22,6 +26,8 @@ from pegbar.simulate.scene import SimulationScene
 Picture = NDArray[np.uint8]
 #: Where in the shot a picture is taken when no frame is named.
 SHARE = 0.5
+#: What an effect makes sense with.
+COMPANIONS = {"umbrella": ("rain",)}
 
 
 def effect_pictures(
@@ -45,10 +51,11 @@ def effect_pictures(
     for name in presets:
         with tempfile.TemporaryDirectory() as folder:
             try:
-                elements = preset_elements(
-                    name, characters[0], ground=bare.ground, seed=bare.seed, cameras=bare.cameras
-                )
-                scene = dataclasses.replace(bare, elements=elements)
+                made = [
+                    preset_elements(kind, characters[0], ground=bare.ground, seed=bare.seed, cameras=bare.cameras)
+                    for kind in (name, *COMPANIONS.get(name, ()))
+                ]
+                scene = dataclasses.replace(bare, elements=tuple(itertools.chain(*made)))
                 cache = DiskCache(Path(folder))
                 simulate_scene(scene, cache, ENGINES, progress=progress)
             except (ValueError, SimulationError) as error:
