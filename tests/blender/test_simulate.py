@@ -10,11 +10,14 @@ from pegbar.simulate.blender.engine import BlenderEngine
 from pegbar.simulate.blender.locate import Blender
 from pegbar.simulate.cache import MemoryCache
 from pegbar.simulate.cloth import ClothEngine
-from pegbar.simulate.elements import Balls, Boxes, Cloth, Pin, Prop
+from pegbar.simulate.elements import Balls, Boxes, Cloth, Pin, Prop, Strands
 from pegbar.simulate.engine import simulate_scene
 from pegbar.simulate.materials import Wind
-from pegbar.simulate.measures import measure_cloth
+from pegbar.simulate.measures import measure_cloth, measure_particles, measure_strands
+from pegbar.simulate.particles import FALLING, SETTLED
 from pegbar.simulate.scene import Character, PreRoll, SimulationScene
+from pegbar.simulate.strands import StrandEngine
+from pegbar.simulate.weather import ParticleMaterial, Particles
 
 STILL = PreRoll(0, 0)
 
@@ -139,6 +142,68 @@ def test_wind_blows_a_cloth_as_far_as_our_engine_does_within_a_factor(blender: B
         leaned[name] = track(cache, "flag", 24)[-8:, -6:, 2].mean()
     assert leaned["ours"] > 0.05
     assert 0.4 < leaned["theirs"] / leaned["ours"] < 2.5
+
+
+def test_strands_swing_as_ours_and_lie_over_a_limb(blender: Blender) -> None:
+    along = np.arange(30) * 0.04
+    zero = np.zeros(30)
+    swings = np.stack([along, zero + 1.5, zero + 0.6], 1)
+    lies = np.stack([zero + 0.1, zero + 0.75, along - 0.58], 1)
+    count, radius, pin = np.array([30]), np.array([0.01]), Pin("world", vertices=np.arange(2))
+    strands = (Strands("swings", swings, count, radius, (pin,)), Strands("lies", lies, count, radius))
+    bar = post(20, start=(-0.6, 0.6, 0), end=(0.6, 0.6, 0))
+    found = {}
+    for name, engine in (("ours", StrandEngine()), ("theirs", BlenderEngine(blender))):
+        scene = SimulationScene(24, 20, strands, (bar,), ground=0.0, pre_roll=STILL, wind=Wind((0, 0, 3.0), 0.0))
+        cache = MemoryCache()
+        simulate_scene(scene, cache, [engine])
+        found[name] = track(cache, "swings", 20)
+    assert np.abs(found["ours"][:10] - found["theirs"][:10]).max() < 0.05
+    assert np.abs(found["theirs"][:, :2] - swings[:2]).max() < 1e-4
+    for name in ("swings", "lies"):
+        measures = measure_strands(scene, cache, name)
+        assert measures.penetration.max() < 5e-3
+        assert np.abs(measures.stretch).max() < 0.03
+    assert track(cache, "lies", 20)[-1, :, 1].max() == pytest.approx(0.71, abs=0.02)
+
+
+def test_snow_falls_evenly_with_the_wind_and_rides_on_a_limb(blender: Blender) -> None:
+    material = ParticleMaterial(terminal_velocity=1.1, flutter=0.3, stick=1.0, run_off=0.0)
+    snow = Particles("snow", (-1, 0, -1), (1, 2, 1), 400, material)
+    bar = post(20, start=(-0.8, 0.6, 0), end=(0.8, 0.6, 0), step=(0, 0, 0.02), radius=0.2)
+    scene = SimulationScene(24, 20, (snow,), (bar,), ground=0.0, wind=Wind((0.4, 0, 0), 0.0))
+    caches = [MemoryCache(), MemoryCache()]
+    for cache in caches:
+        simulate_scene(scene, cache, [BlenderEngine(blender)])
+    first, last = (caches[0].read("snow", frame) for frame in (0, 19))
+    for state in (first, last):
+        falls = state["codes"][:, 2] == FALLING
+        assert 300 < falls.sum() < 550
+        assert np.allclose(state["velocities"][falls].mean(axis=0), [0.4, -1.1, 0], atol=0.08)
+        assert np.median(state["positions"][falls, 1]) == pytest.approx(1.0, abs=0.2)
+        sway = state["velocities"][falls].std(axis=0)
+        assert ((sway > 0.08) & (sway < 0.4)).all()
+    lies = (last["codes"][:, 2] == SETTLED) & (last["positions"][:, 1] > 0.3)
+    assert lies.sum() > 20
+    assert last["positions"][lies, 2].mean() == pytest.approx(0.38, abs=0.1)
+    assert measure_particles(scene, caches[0], "snow").penetration.max() < 0.02
+    assert np.array_equal(last["positions"], caches[1].read("snow", 19)["positions"])
+
+
+def test_rain_ends_where_it_falls(blender: Blender) -> None:
+    rain = Particles("rain", (-1, 0, -1), (1, 2, 1), 300, ParticleMaterial(terminal_velocity=7.0, stick=0.0))
+    roof = post(8, start=(-2, 1.0, 0), end=(2, 1.0, 0), radius=0.5)
+    scene = SimulationScene(24, 8, (rain,), (roof,), ground=0.0)
+    cache = MemoryCache()
+    simulate_scene(scene, cache, [BlenderEngine(blender)])
+    state = cache.read("rain", 7)
+    places = state["positions"]
+    assert (state["codes"][:, 2] == FALLING).all()
+    assert np.allclose(np.median(state["velocities"], axis=0), [0, -7, 0], atol=0.1)
+    above = (places[:, 1] > 1.6).sum()
+    assert above > 30
+    # Under the roof it is dry.
+    assert ((places[:, 1] < 0.8) & (np.abs(places[:, 2]) < 0.4)).sum() == 0
 
 
 def test_the_same_bits_every_time_and_a_run_that_is_taken_up(blender: Blender) -> None:

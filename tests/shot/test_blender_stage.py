@@ -10,6 +10,12 @@ import pytest
 from pegbar.cli.main import main
 from pegbar.io.exr import read_passes
 from pegbar.sample.shot import write_sample
+from pegbar.shot.secondary_stage import SecondaryStage
+from pegbar.simulate.chains import Bobs
+from pegbar.simulate.elements import Balls, Strands
+from pegbar.simulate.engine import assign
+from pegbar.simulate.scene import SimulationScene
+from pegbar.simulate.weather import Particles
 from tests.blenders import fake_blender
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="the pretended programs are scripts")
@@ -80,6 +86,23 @@ def test_a_frame_that_is_not_what_it_should_be_is_refused(shot, capsys, spoil, p
     fake_blender(shot.parent, RENDERS.format(spoil=spoil))
     assert main(["secondary", str(shot), "--jobs", "1", "--renderer", "blender", "--overwrite"]) in (1, 2)
     assert problem in capsys.readouterr().err
+
+
+def test_what_blender_lacks_is_simulated_by_our_engines(shot):
+    fake_blender(shot.parent)
+    elements = [
+        Balls("balls", [[0, 1, 0]], [0.1]),
+        Strands("balloon", [[0, 1, 0], [0, 2, 0]], [2], [0.01], bobs=Bobs([0.2])),
+        Strands("rope", [[0, 1, 0], [0, 2, 0]], [2], [0.01]),
+        Particles("snow", (0, 0, 0), (1, 1, 1), 5),
+        Particles("drops", (0, 0, 0), (1, 1, 1), 0),
+    ]
+    shares = assign(SimulationScene(24, 2, elements), SecondaryStage(shot, engine="blender").engines)
+    assert {engine.name: [element.name for element in share] for engine, share in shares} == {
+        "blender": ["balls", "rope", "snow"],
+        "strands": ["balloon"],
+        "particles": ["drops"],
+    }
 
 
 def test_a_crash_while_simulating_is_told(shot, capsys):

@@ -16,10 +16,12 @@ from pegbar.simulate.blender.cloth import UNIT, cloth_entry, colliders, settings
 from pegbar.simulate.blender.engine import BlenderEngine, limb_arrays
 from pegbar.simulate.blender.locate import Blender, find_blender
 from pegbar.simulate.blender.render import BlenderJob, camera_of, passes_of, squared, welded
+from pegbar.simulate.blender.strands import strand_settings, strands_entry
 from pegbar.simulate.cache import MemoryCache
-from pegbar.simulate.elements import Balls, Boxes, Cloth, Pin
+from pegbar.simulate.chains import Bobs
+from pegbar.simulate.elements import Balls, Boxes, Cloth, Pin, Strands
 from pegbar.simulate.engine import simulate_scene
-from pegbar.simulate.materials import ClothMaterial, Wind
+from pegbar.simulate.materials import ClothMaterial, StrandMaterial, Wind
 from pegbar.simulate.passes import Ink
 from pegbar.simulate.scene import Character, PreRoll, SimulationScene
 from tests.blenders import fake_blender
@@ -186,6 +188,49 @@ def test_a_material_in_blenders_terms():
     assert found["air_damping"] == pytest.approx(100 * UNIT * 0.05 * 0.3)
 
 
+LINES = np.array([[0, 1.2, 0], [0, 1.1, 0], [0, 1.0, 0], [0, 0.9, 0], [1, 1, 0], [1, 0.9, 0]])
+TOP = Pin("marker", "top", np.array([0, 1]))
+
+
+def tassel(**more):
+    return Strands("tassel", LINES, np.array([4, 2]), np.array([0.01, 0.01]), (TOP,), **more)
+
+
+def test_strands_are_told_as_slivers_with_the_wind_as_a_pull():
+    material = StrandMaterial(density=800, bend=1e-4, stretch=0.01, drag=0.5)
+    strands = tassel(material=material)
+    entry, found = strands_entry(scene_of(strands, wind=Wind((2.0, 0, 0), 0.0)), strands, "s", 16)
+    assert entry["pulls"] is True
+    assert entry["thickness"] == pytest.approx(0.01)
+    # No sliver and no edge goes from one strand to the next.
+    assert found["s_triangles"].tolist() == [[0, 1, 2], [1, 2, 3]]
+    assert found["s_seams"].tolist() == [[4, 5]]
+    assert np.allclose(found["s_launch"], [0.1, 0, 0])
+    assert np.allclose(found["s_places"][2], LINES[:2] + np.array([0.2, 0, 0]))
+    mass = np.pi * 0.01**2 * 0.4 * 800 / 6
+    push = 1.2 / 2 * 0.5 * 0.02 * 0.4 / 6 / mass * 4
+    assert np.allclose(found["s_wind"], [[push, -9.81, 0]] * 5)
+
+
+def test_a_strands_material_in_blenders_terms():
+    found = strand_settings(tassel(material=StrandMaterial(bend=1e-4, stretch=0.01, drag=0.0)), 16, 24.0)
+    # Four links of 0.1 m and two springs over two.
+    length = (4 * 0.1 + 2 * 0.2) / 6
+    assert found["mass"] == pytest.approx(np.pi * 0.01**2 * 0.4 * 800 / 6)
+    assert found["tension_stiffness"] / length == pytest.approx(0.001 * 10 / 0.01 / 0.1)
+    assert found["compression_stiffness"] / length == pytest.approx(0.001 * 16 * 1e-4 / 0.1**3 / 0.25)
+    assert found["air_damping"] == pytest.approx(100 * UNIT * found["mass"] * 0.3)
+    stiff = strand_settings(tassel(material=StrandMaterial(bend=10.0)), 16, 24.0)
+    assert stiff["compression_stiffness"] == stiff["tension_stiffness"] == pytest.approx(length * 0.001 * 1e4 / 0.1)
+
+
+def test_strands_with_bobs_are_refused_by_name():
+    engine = BlenderEngine(Blender("blender", False, "5.0.1"))
+    assert engine.supports(tassel())
+    with pytest.raises(ValueError, match=r"blender cannot simulate tassel \(Strands\)"):
+        simulate_scene(scene_of(tassel(bobs=Bobs(np.array([0.05, 0.05])))), MemoryCache(), [engine])
+
+
 WRITES = """
 sys.path.insert(0, {tree!r})
 import json, numpy as np
@@ -211,9 +256,10 @@ def engine_that(folder, spoil="pass"):
 
 @pytest.mark.skipif(os.name == "nt", reason="the pretended programs are scripts")
 def test_the_engine_puts_what_blender_wrote_into_the_cache(tmp_path):
-    scene, cache, told = scene_of(FLAG, BALLS), MemoryCache(), []
+    scene, cache, told = scene_of(FLAG, BALLS, tassel()), MemoryCache(), []
     simulate_scene(scene, cache, [engine_that(tmp_path)], progress=lambda *step: told.append(step))
     assert np.allclose(cache.read("flag", 2)["positions"], FLAG.vertices + np.array([0.02, 0, 0]))
+    assert np.allclose(cache.read("tassel", 2)["positions"], LINES + np.array([0.02, 0, 0]))
     assert np.allclose(cache.read("the balls", 1)["velocities"], [0.24, 0, 0])
     assert cache.read("the balls", 1)["rotations"].shape == (2, 4)
     assert told == [("blender", 2, 3), ("blender", 3, 3)]

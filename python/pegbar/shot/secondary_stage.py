@@ -96,7 +96,7 @@ class SecondaryStage:
         """What simulates."""
         if self.secondary.section.engine == "pegbar":
             return ENGINES
-        return (BlenderEngine(self.secondary.blender), ParticleEngine())
+        return (BlenderEngine(self.secondary.blender), StrandEngine(), ParticleEngine())
 
     def simulate(self, drivings: list[Driving]) -> SimulationScene:
         """Simulate what is out of date; return the scene. SimulationError where it explodes."""

@@ -144,7 +144,7 @@ class _Run:
     """The particles of one element on their way through the frames."""
 
     def __init__(self, scene: SimulationScene, element: Particles, colliders: Colliders) -> None:
-        self.scene, self.element, self.colliders = scene, _over_props(scene, element), colliders
+        self.scene, self.element, self.colliders = scene, over_props(scene, element), colliders
         element = self.element
         self.waves = scene.wind.waves()
         self.stream = element.stream(np.array(scene.gravity), np.array(scene.wind.velocity))
@@ -255,7 +255,7 @@ class _Run:
         )
 
 
-def _over_props(scene: SimulationScene, element: Particles) -> Particles:
+def over_props(scene: SimulationScene, element: Particles) -> Particles:
     """The particles with their box raised over all that is held, so that none begin under it; as full as before."""
     props = [prop for prop in scene.elements if isinstance(prop, Prop)]
     top = max((float(pin_track(scene, prop.pin, prop.vertices)[..., 1].max()) for prop in props), default=-math.inf)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from pegbar.simulate.cache import Cache
-from pegbar.simulate.elements import Balls, Boxes, Cloth, Prop
+from pegbar.simulate.elements import Balls, Boxes, Cloth, Prop, Strands
 from pegbar.simulate.hulls import hull_triangles, hull_vertices, poses
 from pegbar.simulate.scene import SimulationScene
 from pegbar.simulate.tracks import Volumes, pin_track
@@ -55,6 +55,7 @@ def cloth_entry(
         "name": name,
         "settings": settings_of(cloth, substeps, scene.frame_rate),
         "sewn": bool(len(cloth.seams)),
+        "pulls": False,
         "thickness": max(0.001, cloth.material.thickness),
         "friction": cloth.material.friction,
         "collision_quality": 4,
@@ -96,12 +97,13 @@ def settings_of(cloth: Cloth, substeps: int, frame_rate: float) -> dict[str, flo
     }
 
 
-def held(scene: SimulationScene, cloth: Cloth) -> tuple[NDArray[np.int64], Floats]:
+def held(scene: SimulationScene, cloth: Cloth | Strands) -> tuple[NDArray[np.int64], Floats]:
     """The pinned vertices (P,) and their places (F, P, 3); a vertex of several pins follows the last."""
+    start = cloth.points if isinstance(cloth, Strands) else cloth.vertices
     found: dict[int, Floats] = {}
     for pin in cloth.pins:
-        vertices = np.arange(len(cloth.vertices)) if pin.vertices is None else pin.vertices
-        track = pin_track(scene, pin, cloth.vertices[vertices])
+        vertices = np.arange(len(start)) if pin.vertices is None else pin.vertices
+        track = pin_track(scene, pin, start[vertices])
         found |= {int(vertex): track[:, index] for index, vertex in enumerate(vertices)}
     if not found:
         return np.empty(0, np.int64), np.empty((scene.frames, 0, 3))
@@ -175,11 +177,17 @@ def wind_of(scene: SimulationScene, cloth: Cloth, middle: Floats) -> Floats:
         return np.empty((0, 3))
     numbers = np.arange(-scene.pre_roll.frames, scene.frames)
     places, times = middle[np.maximum(numbers, 0)], numbers[:, None] / scene.frame_rate
-    air = np.tile(np.array(scene.wind.velocity), (len(numbers), 1))
-    waves = scene.wind.waves()
-    if len(waves):
-        air += np.sin(places @ waves[:, 3:6].T - times * waves[:, 6] + waves[:, 7]) @ waves[:, :3]
+    air = air_at(scene, places, times)
     speed = np.linalg.norm(air, axis=1, keepdims=True)
     force = HALF_AIR * cloth.material.drag * UNIT**2 / WIND_PRESSURE
     push: Floats = air * speed * force * scene.frame_rate
     return push
+
+
+def air_at(scene: SimulationScene, places: Floats, times: Floats) -> Floats:
+    """The air's velocity (T, 3) in m/s at ``places`` (T, 3) and ``times`` (T, 1) in seconds."""
+    air = np.tile(np.array(scene.wind.velocity), (len(places), 1))
+    waves = scene.wind.waves()
+    if len(waves):
+        air += np.sin(places @ waves[:, 3:6].T - times * waves[:, 6] + waves[:, 7]) @ waves[:, :3]
+    return air

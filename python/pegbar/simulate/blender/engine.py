@@ -1,4 +1,4 @@
-"""The engine that simulates in Blender: balls and boxes by Bullet, cloth by Blender's own, props carried along."""
+"""The engine that simulates in Blender: bodies by Bullet, cloth and strands by its cloth, props carried along."""
 
 from __future__ import annotations
 
@@ -16,13 +16,16 @@ from numpy.typing import NDArray
 from pegbar.errors import BlenderError
 from pegbar.simulate.blender.cloth import cloth_entry, colliders
 from pegbar.simulate.blender.locate import Blender
+from pegbar.simulate.blender.particles import Tell, simulate_particles
 from pegbar.simulate.blender.process import INSIDE, run_blender
+from pegbar.simulate.blender.strands import strands_entry
 from pegbar.simulate.cache import Cache
-from pegbar.simulate.elements import Balls, Boxes, Cloth, Element, Prop
+from pegbar.simulate.elements import Balls, Boxes, Cloth, Element, Prop, Strands
 from pegbar.simulate.engine import Progress, refuse_explosion
 from pegbar.simulate.hulls import hull_triangles, hull_vertices, poses
 from pegbar.simulate.scene import SimulationScene
 from pegbar.simulate.tracks import Volumes, pin_track
+from pegbar.simulate.weather import Particles
 
 Floats = NDArray[np.float64]
 Arrays = dict[str, NDArray[Any]]
@@ -32,7 +35,7 @@ THINNEST = 1e-3
 
 @dataclass(frozen=True)
 class BlenderEngine:
-    """Simulates cloth, balls and boxes in ``blender``, each frame in ``rigid_substeps`` or ``cloth_substeps`` steps.
+    """Simulates cloth, strands, bodies and particles in ``blender``, with ``rigid_substeps`` and ``cloth_substeps``.
 
     Bodies come first, then one cloth after the other: it meets the limbs, props, bodies and the ground, and with
     ``self_collision`` itself. Blender cannot go on from a frame: a run that is taken up begins anew and writes what
@@ -46,10 +49,15 @@ class BlenderEngine:
     name: str = "blender"
 
     def supports(self, element: Element) -> bool:
-        """Whether ``element`` is cloth, a prop, or bodies at rest: Blender knows no speed that a body begins with."""
+        """Whether ``element`` is cloth, a prop, strands without bobs, falling particles, or bodies at rest.
+
+        Blender knows no speed that a body begins with, and a cloth's vertices have one mass.
+        """
         if isinstance(element, Balls | Boxes):
             return not element.velocities.any()
-        return isinstance(element, Cloth | Prop)
+        if isinstance(element, Particles):
+            return element.count > 0
+        return isinstance(element, Cloth | Prop) or (isinstance(element, Strands) and element.bobs is None)
 
     def run(
         self, scene: SimulationScene, elements: Sequence[Element], cache: Cache, start: int, progress: Progress | None
@@ -59,18 +67,22 @@ class BlenderEngine:
             for frame, places in enumerate(pin_track(scene, prop.pin, prop.vertices)):
                 cache.write(prop.name, frame, {"positions": places})
         bodies = [element for element in elements if isinstance(element, Balls | Boxes)]
-        cloths = [element for element in elements if isinstance(element, Cloth)]
-        steps = bool(bodies) + bool(cloths)
+        cloths = [element for element in elements if isinstance(element, Cloth | Strands)]
+        particles = [element for element in elements if isinstance(element, Particles)]
+        steps = bool(bodies) + bool(cloths) + bool(particles)
         if bodies:
             self._simulate(scene, bodies, [], cache, start, progress, (0, steps))
         if cloths:
             self._simulate(scene, [], cloths, cache, start, progress, (int(bool(bodies)), steps))
+        if particles:
+            tell = self._teller(scene, progress, (steps - 1, steps))
+            simulate_particles(scene, particles, cache, start, self.blender, tell)
 
     def _simulate(
         self,
         scene: SimulationScene,
         bodies: Sequence[Balls | Boxes],
-        cloths: Sequence[Cloth],
+        cloths: Sequence[Cloth | Strands],
         cache: Cache,
         start: int,
         progress: Progress | None,
@@ -78,10 +90,7 @@ class BlenderEngine:
     ) -> None:
         """Have Blender simulate one kind, and put its frames into the cache."""
 
-        def tell(done: int, total: int) -> None:
-            if progress is not None:
-                progress(self.name, round(scene.frames * (part[0] + done / max(total, 1)) / part[1]), scene.frames)
-
+        tell = self._teller(scene, progress, part)
         with tempfile.TemporaryDirectory(prefix="pegbar-blender-") as place:
             folder = Path(place)
             # Elements' names are kept out of file names.
@@ -95,11 +104,20 @@ class BlenderEngine:
             for element, path in zip((*bodies, *cloths), outputs, strict=True):
                 store(scene, element, read_result(path, scene, element), cache, start)
 
+    def _teller(self, scene: SimulationScene, progress: Progress | None, part: tuple[int, int]) -> Tell:
+        """Return what is told of a part's steps, and tells of all frames."""
+
+        def tell(done: int, total: int) -> None:
+            if progress is not None:
+                progress(self.name, round(scene.frames * (part[0] + done / max(total, 1)) / part[1]), scene.frames)
+
+        return tell
+
     def _job(
         self,
         scene: SimulationScene,
         bodies: Sequence[Balls | Boxes],
-        cloths: Sequence[Cloth],
+        cloths: Sequence[Cloth | Strands],
         cache: Cache,
         names: dict[str, str],
     ) -> tuple[dict[str, Any], Arrays]:
@@ -126,7 +144,10 @@ class BlenderEngine:
         # A power of two: Blender adds up steps until a frame is full, and with any other number one more may fit.
         substeps = 2 ** max(0, round(np.log2(self.cloth_substeps * 24 / scene.frame_rate)))
         for cloth in cloths:
-            entry, more = cloth_entry(scene, cloth, names[cloth.name], substeps, self.self_collision)
+            if isinstance(cloth, Strands):
+                entry, more = strands_entry(scene, cloth, names[cloth.name], substeps)
+            else:
+                entry, more = cloth_entry(scene, cloth, names[cloth.name], substeps, self.self_collision)
             job["cloths"].append(entry)
             arrays |= more
         return job, arrays
@@ -171,7 +192,7 @@ def body_entry(element: Balls | Boxes, name: str) -> tuple[dict[str, Any], Array
     return entry, {f"{name}_{what}": array for what, array in arrays.items()}
 
 
-def read_result(path: Path, scene: SimulationScene, element: Balls | Boxes | Cloth) -> Arrays:
+def read_result(path: Path, scene: SimulationScene, element: Balls | Boxes | Cloth | Strands) -> Arrays:
     """Read what Blender made of ``element``; BlenderError where it is not what was asked for."""
     shapes = {"positions": (scene.frames, _count(element), 3)}
     if isinstance(element, Balls | Boxes):
@@ -199,5 +220,7 @@ def store(scene: SimulationScene, element: Element, result: Arrays, cache: Cache
             cache.write(element.name, frame, state | {"velocities": velocities[frame]})
 
 
-def _count(element: Balls | Boxes | Cloth) -> int:
+def _count(element: Balls | Boxes | Cloth | Strands) -> int:
+    if isinstance(element, Strands):
+        return len(element.points)
     return len(element.vertices) if isinstance(element, Cloth) else len(element.centers)

@@ -7,17 +7,26 @@ metres with Y up, as they come: gravity is a setting, and nothing else in Blende
 from __future__ import annotations
 
 import json
-import struct
 import sys
 from pathlib import Path
 from typing import Any
 
 import bpy
 import numpy as np
-from mathutils import Quaternion, Vector
+from mathutils import Quaternion
+from parts import (  # type: ignore[import-not-found]  # beside this script
+    REACH,
+    Progress,
+    add_collision,
+    add_ground,
+    add_pull,
+    add_wind,
+    box,
+    follow,
+    new_object,
+    new_scene,
+)
 
-#: Half the side of the ground, in metres.
-REACH = 100.0
 #: Frames at the start of a run in which a cloth is carried from its rest shape to where it begins.
 LEAD = 3
 #: How strongly the air holds a cloth that settles, in times its usual: in the first frame and in the last.
@@ -35,30 +44,6 @@ def main(folder: Path) -> None:
             np.savez(folder / f"{name}.npz", **state)
     for cloth in job["cloths"]:
         np.savez(folder / f"{cloth['name']}.npz", positions=simulate_cloth(job, cloth, arrays, folder, tell))
-
-
-class Progress:
-    """Counts frames."""
-
-    def __init__(self, total: int) -> None:
-        self.done, self.total = 0, total
-
-    def step(self) -> None:
-        """One more frame is done."""
-        self.done += 1
-        print(f"pegbar:progress:{self.done}:{self.total}", flush=True)
-
-
-def new_scene(job: dict[str, Any]) -> Any:
-    """An empty scene with the job's time and gravity; Blender's frame 1 is the pre-roll's first."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    bpy.context.preferences.edit.keyframe_new_interpolation_type = "LINEAR"
-    scene = bpy.context.scene
-    rate = max(1, round(job["frame_rate"]))
-    scene.render.fps, scene.render.fps_base = rate, rate / job["frame_rate"]
-    scene.frame_start, scene.frame_end = 1, job["total"]
-    scene.use_gravity, scene.gravity = True, job["gravity"]
-    return scene
 
 
 def simulate_bodies(job: dict[str, Any], arrays: dict[str, Any], tell: Progress) -> dict[str, dict[str, Any]]:
@@ -198,10 +183,10 @@ class ClothRun:
             follow(volumes, self.folder / "volumes.pc2", collider[0])
             add_collision(volumes, cloth)
         if ground is not None:
-            sides = [(-REACH, ground, -REACH), (-REACH, ground, REACH), (REACH, ground, REACH), (REACH, ground, -REACH)]
-            add_collision(new_object(scene, "ground", np.array(sides), np.array([(0, 1, 2), (0, 2, 3)])), cloth)
+            add_collision(add_ground(scene, ground), cloth)
         if len(wind):
-            add_wind(scene, np.concatenate([np.repeat(wind[:1], total - len(wind), axis=0), wind]))
+            blow = add_pull if cloth["pulls"] else add_wind
+            blow(scene, np.concatenate([np.repeat(wind[:1], total - len(wind), axis=0), wind]))
         places = np.empty((total, len(track[0]), 3), np.float32)
         for frame in range(1, total + 1):
             scene.frame_set(frame)
@@ -241,59 +226,6 @@ def set_cloth(built: Any, cloth: dict[str, Any], total: int, settles: bool) -> N
     meets.distance_min = meets.self_distance_min = cloth["thickness"]
     meets.friction, meets.use_self_collision = cloth["friction"], cloth["self_collision"]
     modifier.point_cache.frame_start, modifier.point_cache.frame_end = 1, total
-
-
-def add_collision(built: Any, cloth: dict[str, Any]) -> None:
-    """Let cloth collide with an object."""
-    built.modifiers.new("collision", "COLLISION")
-    built.collision.thickness_outer = 0.001
-    built.collision.cloth_friction = 100 * min(0.8, cloth["friction"])
-    built.collision.damping = 0.0
-
-
-def add_wind(scene: Any, wind: Any) -> None:
-    """Air that blows alike everywhere: its push (T, 3) a frame, in Blender's strength."""
-    field = bpy.data.objects.new("wind", None)
-    scene.collection.objects.link(field)
-    bpy.context.view_layer.objects.active = field
-    bpy.ops.object.forcefield_toggle()
-    field.field.type = "WIND"
-    field.field.flow = field.field.noise = 0.0
-    field.rotation_mode = "QUATERNION"
-    for frame, push in enumerate(wind, 1):
-        strength = float(np.linalg.norm(push))
-        if strength > 0:
-            # It blows along +Z.
-            field.rotation_quaternion = Vector((0.0, 0.0, 1.0)).rotation_difference(Vector(push.tolist()))
-        field.field.strength = strength
-        field.keyframe_insert("rotation_quaternion", frame=frame)
-        field.field.keyframe_insert("strength", frame=frame)
-
-
-def follow(built: Any, path: Path, track: Any) -> None:
-    """Let a mesh's vertices follow ``track`` (T, n, 3), written as a point cache (PC2)."""
-    header = struct.pack("<12siiffi", b"POINTCACHE2\0", 1, track.shape[1], 0.0, 1.0, len(track))
-    path.write_bytes(header + np.ascontiguousarray(track, "<f4").tobytes())
-    modifier = built.modifiers.new("follow", "MESH_CACHE")
-    modifier.cache_format, modifier.filepath, modifier.frame_start = "PC2", str(path), 1.0
-
-
-def new_object(scene: Any, name: str, vertices: Any, triangles: Any, edges: Any = ()) -> Any:
-    """An object of triangles and, for seams, loose edges."""
-    mesh = bpy.data.meshes.new(name)
-    pairs = [tuple(pair) for pair in np.asarray(edges).reshape(-1, 2).tolist()]
-    mesh.from_pydata(np.asarray(vertices).tolist(), pairs, np.asarray(triangles).tolist())
-    mesh.update(calc_edges=True, calc_edges_loose=True)
-    built = bpy.data.objects.new(name, mesh)
-    scene.collection.objects.link(built)
-    return built
-
-
-def box(size: Any) -> tuple[Any, Any]:
-    """Vertices and sides of a box about the origin."""
-    corners = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    return corners * np.asarray(size), np.array(sides)
 
 
 if __name__ == "__main__":

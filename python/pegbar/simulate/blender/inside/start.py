@@ -20,6 +20,7 @@ def main() -> None:
     script, *arguments = sys.argv[sys.argv.index("--") + 1 :]
     threading.Thread(target=end_with_parent, daemon=True).start()
     sys.argv = [script, *arguments]
+    sys.path.insert(0, os.path.dirname(script))
     code = 1
     try:
         runpy.run_path(script, run_name="__main__")
