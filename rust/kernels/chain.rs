@@ -248,10 +248,18 @@ mod tests {
         // In a hundredth of a second the bob falls outwards by a millimetre, and its thread sways.
         places[21].x += 1e-3;
         places[10].y = 1e-4;
-        Lengths::new(&points, 0.01).restore(&points, 1, &mut places);
-        assert_eq!(places[0], DVec3::ZERO);
-        assert!(places.windows(2).all(|pair| (pair[1].distance(pair[0]) - 0.1).abs() < 2e-5), "{places:?}");
-        assert!(places.iter().all(|place| place.y.abs() < 1e-4), "{places:?}");
+        let mut lengths = Lengths::new(&points, 0.01);
+        let off = |places: &[DVec3]| {
+            places.windows(2).map(|pair| (pair[1].distance(pair[0]) - 0.1).abs()).fold(0.0, f64::max)
+        };
+        // As many rounds as a string that holds a bob gets: the bob hangs at the thread's length.
+        let mut hanging = places.clone();
+        lengths.restore(&points, 4, &mut hanging);
+        assert_eq!(hanging[0], DVec3::ZERO);
+        assert!(off(&hanging) < 4e-5 && (hanging[21].x - 2.1).abs() < 3e-3, "{hanging:?}");
+        // What next to no mass holds back swings far in single Newton steps, and comes to lie straight with more.
+        lengths.restore(&points, 16, &mut places);
+        assert!(off(&places) < 2e-5 && places.iter().all(|place| place.y.abs() < 1e-3), "{places:?}");
     }
 
     #[test]
@@ -271,7 +279,10 @@ mod tests {
         let mut places: Vec<DVec3> =
             (0..9).map(|k| DVec3::new(0.12 * f64::from(k), 0.01 * f64::from(k % 2), 0.0)).collect();
         places[8].y = 0.0;
-        Lengths::new(&points, 0.001).restore(&points, 8, &mut places);
+        let mut lengths = Lengths::new(&points, 0.001);
+        for _ in 0..20 {
+            lengths.restore(&points, 2, &mut places);
+        }
         assert!(places.windows(2).all(|pair| (pair[1].x - pair[0].x - 0.12).abs() < 1e-4), "{places:?}");
         assert!(places.iter().all(|place| place.y.abs() < 2e-3), "{places:?}");
     }

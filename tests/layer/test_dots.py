@@ -112,3 +112,14 @@ def test_on_the_drawn_walk_flow_is_better_than_straight_lines(test_data):
         for pictures in (None, gray)
     ]
     assert errors[1] < 0.7 * errors[0]
+
+
+def test_a_joint_that_is_hidden_from_a_drawing_on_goes_along_with_the_figure():
+    walk = np.arange(6)[:, None] * np.array([10.0, 0])
+    marks = walk[:, None] + np.array([(0.0, 0), (0, 20), (5, 10)])
+    there = np.ones((6, 3), bool)
+    there[1] = there[3] = False
+    there[2:, 2] = False
+    carried, flags = carry_marks(marks, there)
+    np.testing.assert_allclose(carried, marks)
+    assert flags[2:, 2].all()

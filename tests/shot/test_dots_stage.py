@@ -1,6 +1,7 @@
 """`pegbar dots`: a layer of dots over the sample's drawings becomes its annotations."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from pegbar.cli.main import main
 from pegbar.io.frames import write_image
 from pegbar.report.canvas import Canvas
 from pegbar.scene.body import MARKERS
+from pegbar.shot import dots_stage
 
 COLORS = [(r, g, b) for r in (0, 120, 255) for g in (0, 120, 255) for b in (0, 120, 255) if len({r, g, b}) > 1]
 SHOT = """\
@@ -109,3 +111,19 @@ def test_a_colour_of_a_limb_that_is_none_is_named(tmp_path, capsys):
     assert "dots.limbs: no limb left_wing between joints that have dots" in told
     assert "left_forearm" in told
     assert not (tmp_path / "marks.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("?", "#ff0000 has no joint yet: write which one its dot is"),
+        ("left_hnad", r"#ff0000: no joint 'left_hnad' \(did you mean 'left_hand'\?\)"),
+    ],
+)
+def test_colours_without_a_joint_and_misspelt_joints_are_named_before_dots_are_read(name, message):
+    assert re.search(message, dots_stage._problem({"#ff0000": name}) or "")
+
+
+def test_joints_of_ones_own_may_be_like_known_ones():
+    assert dots_stage._problem({"#ff0000": "left_hand", "#00ff00": "left_hand2", "#0000ff": "tail"}) is None
+    assert "no colour has a joint yet" in (dots_stage._problem({}) or "")

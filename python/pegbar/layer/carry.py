@@ -96,7 +96,7 @@ def _straight(marks: Floats, there: Flags) -> Floats:
     a hidden elbow along.
     """
     moments, carried = np.arange(len(marks)), np.full(marks.shape, np.nan)
-    steady = there[there.any(axis=1)].all(axis=0)
+    steady: Flags = np.all(there[there.any(axis=1)], axis=0)
     body = np.zeros((len(marks), 2))
     for marker in (*np.flatnonzero(steady), *np.flatnonzero(there.any(axis=0) & ~steady)):
         keys = moments[there[:, marker]]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import hashlib
 import json
 import tomllib
@@ -21,14 +22,15 @@ from pegbar.io.sequence import FrameSequence
 from pegbar.layer.carry import carry_marks
 from pegbar.layer.dots import Dots, find_dots
 from pegbar.layer.matte import ink_alpha
-from pegbar.scene.body import limbs_between
+from pegbar.scene.body import MARKERS, limbs_between
 from pegbar.scene.drawing import Drawing
+from pegbar.scene.joints import EXTRA
 from pegbar.shot.find import find_input
 from pegbar.shot.load import load_shot
 from pegbar.shot.model import DotsSection, ShotFile, parse_color
 from pegbar.shot.record import fingerprint, is_up_to_date, write_record
 
-VERSION = 1
+VERSION = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +90,8 @@ class DotsStage:
         """Which joint each colour stands for."""
         given = self._section().joints
         table = given if isinstance(given, dict) else _read_palette(self.path.absolute().parent / given)
+        if problem := _problem(table):
+            raise ShotError([f"{self.path}: dots.joints: {problem}"])
         twice = [name for name in table.values() if list(table.values()).count(name) > 1]
         if twice:
             raise ShotError([f"{self.path}: dots.joints: {twice[0]} has more than one colour"])
@@ -147,6 +151,19 @@ class DotsStage:
     def _recipe(self, joints: dict[str, str]) -> str:
         parts: list[Any] = [VERSION, self._section().model_dump(), joints, self.settings.shot.frame_rate]
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+
+
+def _problem(table: dict[str, str]) -> str | None:
+    """What is wrong with the names of joints: none, not filled in, or misspelt."""
+    if not table:
+        return 'no colour has a joint yet: write them as "#ff0000" = "left_hand"'
+    for color, name in table.items():
+        if name.strip(" ?") == "":
+            return f"{color} has no joint yet: write which one its dot is"
+        near = difflib.get_close_matches(name, (*MARKERS, *EXTRA), 1, 0.88)
+        if near and near[0] not in table.values():
+            return f"{color}: no joint {name!r} (did you mean {near[0]!r}?)"
+    return None
 
 
 def _near(there: NDArray[np.bool_], keyed: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
@@ -113,13 +114,23 @@ def preset_elements(
 
 
 def check_preset(kind: str, settings: Mapping[str, Any]) -> None:
-    """Raise ValueError for a preset or a setting of it that does not exist, naming those that do."""
+    """Raise ValueError for a preset or setting that there is not (naming those there are) or a value of a wrong kind."""
     if kind not in PRESETS:
-        raise ValueError(f"no preset {kind!r}: there are {', '.join(PRESETS)}")
-    known = [field.name for field in fields(PRESETS[kind])]
-    for field in settings:
+        raise ValueError(f"no preset {kind!r}: there are {', '.join(PRESETS)}{_near(kind, PRESETS)}")
+    known = {field.name: field.default for field in fields(PRESETS[kind])}
+    for field, value in settings.items():
         if field not in known:
-            raise ValueError(f"{kind}: no setting {field!r}: there are {', '.join(known)}")
+            raise ValueError(f"{kind}: no setting {field!r}: there are {', '.join(known)}{_near(field, known)}")
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        if isinstance(known[field], int | float) and not isinstance(known[field], bool) and not is_number:
+            raise ValueError(f"{kind}: {field}: want a number, got {value!r}")
+        if isinstance(known[field], str) and not isinstance(value, str):
+            raise ValueError(f"{kind}: {field}: want a text in quotes, got {value!r}")
+
+
+def _near(name: str, known: Iterable[str]) -> str:
+    near = difflib.get_close_matches(name, list(known), 1)
+    return f" (did you mean {near[0]!r}?)" if near else ""
 
 
 def _value(kind: str, field: str, value: Any) -> Any:
