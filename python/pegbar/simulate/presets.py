@@ -114,7 +114,7 @@ def preset_elements(
 
 
 def check_preset(kind: str, settings: Mapping[str, Any]) -> None:
-    """Raise ValueError for a preset or setting that there is not (naming those there are) or a value of a wrong kind."""
+    """Raise ValueError for a preset or setting that there is not (naming those) or a value of a wrong kind."""
     if kind not in PRESETS:
         raise ValueError(f"no preset {kind!r}: there are {', '.join(PRESETS)}{_near(kind, PRESETS)}")
     known = {field.name: field.default for field in fields(PRESETS[kind])}
