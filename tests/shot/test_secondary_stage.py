@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pegbar.cli.main import main
+from pegbar.cli.secondary import _deep
 from pegbar.errors import SimulationError
 from pegbar.io.exr import read_passes
 from pegbar.io.frames import read_picture
@@ -191,3 +192,10 @@ def test_frames_are_nearly_the_same_without_passes(made):
         assert (apart.max(axis=2) > 0).mean() < 1e-3
     finally:
         made.write_text(text)
+
+
+def test_what_lies_deep_in_a_limb_is_warned_of_with_limb_and_frame():
+    part = {"deepest_penetration_m": 0.02, "in_limb": "left_forearm", "in_frame": 6}
+    slight = {**part, "deepest_penetration_m": 0.01}
+    report = {"height_m": 1.5, "cloth": {"skirt": slight}, "strands": {}, "particles": {"snow": part}}
+    assert _deep(report) == ["snow lies 20 mm deep in left_forearm in frame 6"]

@@ -56,6 +56,8 @@ def match(
         raise ValueError(f"--frame-rate: want frames a second above 0, got {frame_rate}")
     if write is not None:
         load_shot(write)
+    if annotations.suffix.lower() == ".toml":
+        raise ValueError(f"{annotations}: a shot file; want its joint marks, which drawing.annotations names")
     drawing = read_annotations(annotations)
     chosen = _chosen(frames, len(drawing.markers))
     folder = _read(clips, index)

@@ -94,7 +94,19 @@ def _made(stage: SecondaryStage, name: str) -> str:
     return "made" if stage.made.get(name) else "up to date"
 
 
+def _deep(report: dict[str, Any]) -> list[str]:
+    """What lies deeper in a limb than a hundredth of the character's height."""
+    said = []
+    for kind in ("cloth", "strands", "particles"):
+        for name, part in report.get(kind, {}).items():
+            if (depth := part["deepest_penetration_m"]) > 0.01 * report["height_m"]:
+                said.append(f"{name} lies {1000 * depth:.0f} mm deep in {part['in_limb']} in frame {part['in_frame']}")
+    return said
+
+
 def _summarise(stage: SecondaryStage, report: dict[str, Any]) -> None:
+    for deep in _deep(report):
+        print(f"pegbar: warning: {deep}: look at it there, and whether the limb jumps", file=sys.stderr)
     parts = [f"drawn marks and volumes {report['reprojection_px']:.1g} px apart"]
     if report.get("deepest_penetration_m") is not None:
         parts.append(f"deepest penetration {1000 * report['deepest_penetration_m']:.1f} mm")

@@ -132,7 +132,7 @@ matte = "auto"               # auto, ink, unmix, fill or alpha
 # "#8a4b2a" = "head"
 
 # [clip]                     # motion capture: pegbar align finds cameras and depths with it
-# folder = "mocap"           # clips to choose from; pegbar match --write names the best one here
+# folder = "../mocap"        # clips to choose from; pegbar match --write names the best one here
 
 {"" if "beauty" in values else "# "}[passes]
 {_line("beauty", values)}
