@@ -228,7 +228,7 @@ def test_shadows_fall_on_the_field_where_the_light_does_not_come():
         ("snow_field", {"depth": 0.0}, "depth: want a number above zero"),
         ("snow_field", {"softness": 1.5}, "softness 0 to 1"),
         ("snow_field", {"repose": 95.0}, "repose: want less than 90"),
-        ("puddle", {"depth": "deep"}, "depth: want a finite number"),
+        ("puddle", {"depth": "deep"}, "depth: want a number, got .deep."),
         ("puddle", {"size": 0.0}, "size: want a number above zero"),
         ("puddle", {"splash": -1}, "splash: want a finite number of zero or more"),
     ],
