@@ -6,8 +6,9 @@ import textwrap
 from importlib.metadata import version
 
 import pytest
+from rich.console import Console
 
-from pegbar.cli.main import COMMANDS, GROUPS, main
+from pegbar.cli.main import COMMANDS, GROUPS, app, main
 from pegbar.cli.overview import SECTIONS, overview
 
 #: Libraries that take long to load, and our own rooms that need them.
@@ -36,9 +37,16 @@ def test_a_command_without_a_place_is_shown_all_the_same():
     assert "More        new            What is new." in overview({**COMMANDS, "new": "What is new.\n\nMuch."})
 
 
+@pytest.fixture
+def wide():
+    # Not by COLUMNS: every command keeps the console, and its width, of the first time that it printed something.
+    app.console = Console(width=2000)
+    yield
+    app.console = None
+
+
 @pytest.mark.parametrize("name", COMMANDS)
-def test_a_command_shows_its_options_and_an_example(capsys, monkeypatch, name):
-    monkeypatch.setenv("COLUMNS", "2000")
+def test_a_command_shows_its_options_and_an_example(capsys, wide, name):
     for command in [[name], *([name, inner] for inner in GROUPS.get(name, ()))]:
         assert main([*command, "--help"]) == 0
         shown = capsys.readouterr().out
