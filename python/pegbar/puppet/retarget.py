@@ -126,7 +126,7 @@ def facing_turn(puppet: Puppet, clip: Floats, reference: Floats) -> Floats:
 
 
 def _pointed(own: Floats, clip: Floats, before: Floats, turns: Rotation, keep: str, marker: str) -> Floats:
-    """Where a bone drawn as ``own`` (3,) points (F, 3) when the clip's, that pointed ``before`` (3,), points as ``clip``."""
+    """Where a bone drawn as ``own`` (3,) points (F, 3) when the clip's, ``before`` (3,), points as ``clip`` (F, 3)."""
     offset = rotations_between(before, _unit(own)[None])[0]
     directions = turns.inv().apply(clip)
     shares = _kept(offset, directions @ before, keep, marker)
