@@ -34,7 +34,8 @@ from pegbar.shot.drawn import check_drawing, check_drawings
 from pegbar.shot.marks import ALIGNED, outside_warnings
 from pegbar.shot.plan import Shot
 from pegbar.shot.record import fingerprint, forget, is_up_to_date, write_record
-from pegbar.shot.registered import CameraOptions, Retiming
+from pegbar.shot.registered import CameraOptions
+from pegbar.shot.retiming import Retiming
 
 VERSION = 5
 _SHEET = 24
@@ -238,10 +239,15 @@ class AlignStage:
         atomic.write_bytes(errors, _error_table(self.numbers, alignment).encode())
         step = float(np.mean(np.diff(retiming.moments))) if len(retiming.moments) > 1 else 1.0
         offset = float(retiming.moments[0])
-        write_image(
-            warp,
-            warp_picture(retiming.cost, retiming.warp, clip_offset=offset, clip_step=step, title=choice.path.name),
+        plot = warp_picture(
+            retiming.cost,
+            retiming.warp,
+            clip_offset=offset,
+            clip_step=step,
+            title=choice.path.name,
+            thinned=retiming.thinned,
         )
+        write_image(warp, plot)
         # Of a long shot only the sheet's pictures are kept.
         chosen = set(np.linspace(0, len(overlays) - 1, min(_SHEET, len(overlays))).round().astype(int).tolist())
         pictures = []
