@@ -172,7 +172,7 @@ def store_particles(scene: SimulationScene, element: Particles, result: Arrays, 
         landed = ages >= 0
         places = positions[frame]
         inside = ((places > element.low - MARGIN) & (places < element.high + MARGIN)).all(axis=1)
-        overtaken |= deepest(places, volumes[frame]) > DEEP
+        overtaken |= result["alive"][frame] & (deepest(places, volumes[frame]) > DEEP)
         there = result["alive"][frame] & inside & ~overtaken & (~landed | (stays & (ages < material.settle)))
         phases = np.where(landed, SETTLED, FALLING)[there]
         serials = np.flatnonzero(there)
