@@ -31,7 +31,7 @@ from pegbar.shot.simulation_stage import SimulationStage
 from pegbar.simulate.blender.engine import BlenderEngine
 from pegbar.simulate.cloth import ClothEngine
 from pegbar.simulate.elements import Cloth, Strands
-from pegbar.simulate.engine import Engine
+from pegbar.simulate.engine import Engine, assign
 from pegbar.simulate.measures import ClothMeasures, measure_cloth, measure_particles, measure_strands
 from pegbar.simulate.particles import ParticleEngine
 from pegbar.simulate.rapier import RapierEngine
@@ -96,12 +96,13 @@ class SecondaryStage:
         """What simulates."""
         if self.secondary.section.engine == "pegbar":
             return ENGINES
-        return (BlenderEngine(self.secondary.blender), StrandEngine(), ParticleEngine())
+        return (BlenderEngine(self.secondary.blender), *ENGINES)
 
     def simulate(self, drivings: list[Driving]) -> SimulationScene:
         """Simulate what is out of date; return the scene. SimulationError where it explodes."""
         with self._timed("simulation"):
             scene = self.secondary.scene(drivings)
+            self.notes += own_work(scene, self.engines)
             self.made["simulation"] = SimulationStage(self.secondary, scene, self.engines).run(self.progress)
         return scene
 
@@ -182,6 +183,19 @@ class SecondaryStage:
     def _told(self, name: str) -> Callable[[int, int], None] | None:
         tell = self.progress
         return None if tell is None else lambda done, total: tell(name, done, total)
+
+
+def own_work(scene: SimulationScene, engines: Sequence[Engine]) -> list[str]:
+    """Return a note of the elements that Blender, asked to simulate, leaves to our own engines."""
+    if not any(isinstance(engine, BlenderEngine) for engine in engines):
+        return []
+    left = [
+        element.name
+        for engine, share in assign(scene, engines)
+        if not isinstance(engine, BlenderEngine)
+        for element in share
+    ]
+    return [f"Blender cannot simulate {', '.join(left)}: pegbar's own engines do"] if left else []
 
 
 def _reprojection(driving: Driving) -> float:
