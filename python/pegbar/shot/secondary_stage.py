@@ -97,8 +97,8 @@ class SecondaryStage:
         """Simulate what is out of date; return the scene. SimulationError where it explodes."""
         with self._timed("simulation"):
             scene = self.secondary.scene(drivings)
-            self.notes += own_work(scene, self.engines)
             self.made["simulation"] = SimulationStage(self.secondary, scene, self.engines).run(self.progress)
+            self.remarks.add(own_work(scene, self.engines), made=self.made["simulation"])
         return scene
 
     def frames(self, drivings: list[Driving], scene: SimulationScene) -> ElementsStage:
