@@ -62,7 +62,7 @@ def _run(stage: SecondaryStage, options: BatchOptions) -> int:
         except (SimulationError, BlenderError) as error:
             print(f"pegbar: {error}; what was made before is kept", file=sys.stderr)
             return 1
-    print(f"simulation: {scene.frames} frames {_made(stage, 'simulation')}")
+    print(f"simulation: {scene.frames} frame{'' if scene.frames == 1 else 's'} {_made(stage, 'simulation')}")
     frames = stage.frames(drivings, scene)
     if code := _render(stage, frames, options):
         return code
