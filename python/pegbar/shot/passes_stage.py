@@ -17,9 +17,11 @@ from pegbar.io.exr import write_exr
 from pegbar.io.sequence import FrameSequence
 from pegbar.io.simulation_cache import DiskCache
 from pegbar.layer.composite import Space, depth_composite
+from pegbar.layer.reframe import reframe_picture
 from pegbar.layer.rim import rim_depth
 from pegbar.scene.mesh import Mesh
 from pegbar.shot.drawn import Drawn, drawn_inputs, read_drawn
+from pegbar.shot.framed import reframed_channels
 from pegbar.shot.model import SecondarySection
 from pegbar.shot.plan import Shot
 from pegbar.shot.rendered import part_seen, read_rendered
@@ -94,8 +96,11 @@ class ElementsStage(Stage):
         final, *exr = self.outputs(frame)
         picture, notes = self._composite(frame, view.whole())
         write_final(final, picture)
-        if exr:
+        film = self.shot.view(frame, view.size)
+        if exr and film is None:
             write_exr(exr[0], view.channels(), window=view.window)
+        elif exr and film is not None:
+            write_exr(exr[0], reframed_channels(view.channels(), film))
         return notes
 
     def picture(self, frame: int) -> NDArray[np.uint8]:
@@ -163,7 +168,8 @@ class ElementsStage(Stage):
             )
             if not is_last:
                 depth, space = _nearest(depth, drawn, drawn_depth), output.composite_space
-        return beauty, tuple(notes)
+        film = self.shot.view(frame, drawn.size)
+        return beauty if film is None else reframe_picture(beauty, film), tuple(notes)
 
     def _recipe(self, frame: int) -> str:
         layers, shot = self.layers, self.shot
@@ -174,6 +180,7 @@ class ElementsStage(Stage):
         for drawn in (shot, *layers.others):
             parts += [drawn.settings.drawing.model_dump(), drawn.matte]
             parts += [drawn.palette.colors.tolist(), drawn.palette.labels.tolist()]
+        parts += shot.framing(frame)
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 
 
