@@ -56,6 +56,17 @@ def test_markers_turn_as_one_body_and_the_way_with_them():
     np.testing.assert_allclose(turn[..., 1], markers[..., 1])
 
 
+def test_joints_without_a_marker_stay_unknown_and_a_root_may_be_one():
+    markers = np.random.default_rng(5).normal(size=(6, 4, 3))
+    markers[:, 1] = np.nan
+    made = turned_markers(markers, np.full(6, 30.0), 1, 0)
+    assert np.isnan(made[:, 1]).all()
+    assert np.isfinite(made[:, [0, 2, 3]]).all()
+    known = markers[:, [0, 2, 3]]
+    gaps, turned = known[:, 0] - known[:, 1], made[:, 0] - made[:, 2]
+    np.testing.assert_allclose(turned, Rotation.from_euler("y", 30, degrees=True).apply(gaps))
+
+
 def test_a_foot_that_stands_in_a_turn_stands_in_the_limited_one():
     # The root goes round a foot that stands; turned back by as much as it turns, it goes straight past it.
     angles = np.linspace(0, 90, 200)

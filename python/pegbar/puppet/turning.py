@@ -48,10 +48,13 @@ def shown_turn(turned: Floats, frame_rate: float) -> Floats:
 def turned_markers(markers: Floats, degrees: Floats, root: int, anchor: int) -> Floats:
     """Return markers (F, J, 3) turned about the upright through joint ``root`` by ``degrees`` (F,).
 
-    The way of the root turns along, so that feet that stand stay: in frame ``anchor`` it is where it was.
+    The way of the root turns along, so that feet that stand stay: in frame ``anchor`` it is where it was. A root that
+    no marker drives is taken to be in the middle of the others.
     """
     about = Rotation.from_euler("y", degrees[:, None], degrees=True).as_matrix()
     own = markers[:, [root]]
+    if np.isnan(own).any():
+        own = np.nanmean(markers, axis=1, keepdims=True)
     steps = np.diff(own[:, 0], axis=0, prepend=own[:1, 0])
     way = np.cumsum(np.einsum("fij,fj->fi", about, steps), axis=0)
     way += own[anchor, 0] - way[anchor]
