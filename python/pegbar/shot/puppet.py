@@ -26,7 +26,7 @@ from pegbar.shot.record import fingerprint, is_up_to_date, write_record
 
 _Path = str | os.PathLike[str]
 #: Goes up when the same picture gives another puppet.
-VERSION = 3
+VERSION = 4
 
 
 @dataclass(frozen=True)
