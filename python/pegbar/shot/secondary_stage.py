@@ -27,11 +27,12 @@ from pegbar.shot.dots_stage import DotsStage
 from pegbar.shot.find import plan_output
 from pegbar.shot.measured import measured
 from pegbar.shot.passes_stage import ElementsStage, Layers
+from pegbar.shot.remarks import Remarks
 from pegbar.shot.secondary import Secondary
 from pegbar.shot.simulation_stage import SimulationStage
 from pegbar.simulate.blender.engine import BlenderEngine
 from pegbar.simulate.cloth import ClothEngine
-from pegbar.simulate.engine import Engine
+from pegbar.simulate.engine import Engine, assign
 from pegbar.simulate.particles import ParticleEngine
 from pegbar.simulate.rapier import RapierEngine
 from pegbar.simulate.scene import SimulationScene
@@ -47,15 +48,14 @@ ENGINES = (RapierEngine(), ClothEngine(), StrandEngine(), ParticleEngine())
 class SecondaryStage:
     """Runs the stages of the shot file ``path``; ``engine`` and ``renderer`` go before the file's own.
 
-    ``times`` are seconds a stage, ``notes`` what was assumed, and ``warnings`` what looks wrong.
+    ``times`` are seconds a stage, ``remarks`` what was assumed and what looks wrong.
     """
 
     path: Path
     overwrite: bool = False
     progress: Progress | None = None
     times: dict[str, float] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)
+    remarks: Remarks = field(default_factory=Remarks)
     made: dict[str, bool] = field(default_factory=dict)
     engine: Literal["pegbar", "blender"] | None = field(default=None, kw_only=True)
     renderer: Literal["pegbar", "blender"] | None = field(default=None, kw_only=True)
@@ -72,36 +72,42 @@ class SecondaryStage:
         if dots.is_wanted:
             with self._timed("dots"):
                 remarks, self.made["dots"] = dots.run()
-                self.notes += remarks
+                self.remarks.add(remarks, made=self.made["dots"])
         alignments: list[tuple[Alignment | None, bool]] = []
         with self._timed("align"):
             alignments += [stage.align(self._told("align")) for stage in self.secondary.stages]
         with self._timed("volumes"):
             found = [stage.run(self._told("volumes")) for stage in self.secondary.stages]
         self.made |= {"align": any(made for _, made in alignments), "volumes": any(made for _, made in found)}
-        for alignment, _ in alignments:
-            self.notes += () if alignment is None else alignment.notes
-            self.warnings += () if alignment is None else alignment.warnings
-        for stage in self.secondary.stages:
-            self.warnings += stage.remarks()
-        drivings = [driving for driving, _ in found]
-        for driving in drivings:
-            self.warnings += driving.notes
-        return drivings
+        for alignment, made in alignments:
+            if alignment is not None:
+                self.remarks.add(alignment.notes, alignment.warnings, made=made)
+        for stage, (driving, made) in zip(self.secondary.stages, found, strict=True):
+            self.remarks.add(warnings=[*stage.remarks(), *driving.notes], made=made)
+        return [driving for driving, _ in found]
 
     @property
     def engines(self) -> tuple[Engine, ...]:
         """What simulates."""
         if self.secondary.section.engine == "pegbar":
             return ENGINES
-        return (BlenderEngine(self.secondary.blender), StrandEngine(), ParticleEngine())
+        return (BlenderEngine(self.secondary.blender), *ENGINES)
 
     def simulate(self, drivings: list[Driving]) -> SimulationScene:
         """Simulate what is out of date; return the scene. SimulationError where it explodes."""
         with self._timed("simulation"):
             scene = self.secondary.scene(drivings)
             self.made["simulation"] = SimulationStage(self.secondary, scene, self.engines).run(self.progress)
+            self.remarks.add(self.own_work(scene), made=self.made["simulation"])
         return scene
+
+    def own_work(self, scene: SimulationScene) -> list[str]:
+        """Return a note of the elements that Blender, asked to simulate, leaves to our own engines."""
+        if self.secondary.section.engine == "pegbar":
+            return []
+        shares = [share for engine, share in assign(scene, self.engines) if not isinstance(engine, BlenderEngine)]
+        left = ", ".join(element.name for share in shares for element in share)
+        return [f"Blender cannot simulate {left}: pegbar's own engines do"] if left else []
 
     def frames(self, drivings: list[Driving], scene: SimulationScene) -> ElementsStage:
         """Return the stage that renders and composites, frame by frame."""
@@ -165,8 +171,8 @@ class SecondaryStage:
             **measured(scene, DiskCache(self.secondary.folder / "cache"), self.secondary.frames[0]),
             "seconds": {name: round(value, 3) for name, value in self.times.items()},
             "made": self.made,
-            "notes": list(dict.fromkeys(self.notes)),
-            "warnings": list(dict.fromkeys(self.warnings)),
+            "notes": self.remarks.notes,
+            "warnings": self.remarks.warnings,
         }
 
     @contextmanager
