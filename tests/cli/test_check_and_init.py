@@ -297,7 +297,7 @@ def test_init_finds_dots_and_says_where_each_colour_is(tmp_path, capsys):
     text = text.replace('# "#008000" = "?"', '"#008000" = "left_elbow"').replace("# ? = ", "left_forearm = ")
     shot.write_text(text)
     assert run("dots", shot) == 0
-    drawing = read_annotations(tmp_path / "marks.json")
+    drawing = read_annotations(tmp_path / "annotation.json")
     assert drawing.names == ("left_hand", "left_elbow")
     np.testing.assert_allclose(drawing.markers[1], [[12, 20], [30, 8]], atol=0.5)
     assert drawing.limbs[0].color == (0, 0, 255)

@@ -216,4 +216,4 @@ def _secondary(shot: Shot, section: SecondarySection) -> Iterator[Problem]:
         yield _at(shot, "drawing.annotations", what, "add limbs to the annotations")
     if marks is not None and shot.settings.clip is None and (marks.depths is None or not marks.cameras):
         what = "the marks have no cameras and depths, and there is no clip to find them with"
-        yield _at(shot, "secondary", what, "name a clip in [clip]")
+        yield _at(shot, "secondary", what, "name a clip in [clip]: pegbar match --write does")

@@ -110,7 +110,7 @@ def _text(
     if annotations is not None:
         values["annotations"] = annotations.name
     elif found["dots"]:
-        values["annotations"] = "marks.json"
+        values["annotations"] = "annotation.json"
     taken = {Path(value).parent.as_posix() for value in values.values()}
     own = "depth" if "depth" not in taken else "drawing_depth"
     return f"""\
