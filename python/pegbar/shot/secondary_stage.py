@@ -32,7 +32,7 @@ from pegbar.shot.secondary import Secondary
 from pegbar.shot.simulation_stage import SimulationStage
 from pegbar.simulate.blender.engine import BlenderEngine
 from pegbar.simulate.cloth import ClothEngine
-from pegbar.simulate.engine import Engine
+from pegbar.simulate.engine import Engine, assign
 from pegbar.simulate.particles import ParticleEngine
 from pegbar.simulate.rapier import RapierEngine
 from pegbar.simulate.scene import SimulationScene
@@ -91,14 +91,23 @@ class SecondaryStage:
         """What simulates."""
         if self.secondary.section.engine == "pegbar":
             return ENGINES
-        return (BlenderEngine(self.secondary.blender), StrandEngine(), ParticleEngine())
+        return (BlenderEngine(self.secondary.blender), *ENGINES)
 
     def simulate(self, drivings: list[Driving]) -> SimulationScene:
         """Simulate what is out of date; return the scene. SimulationError where it explodes."""
         with self._timed("simulation"):
             scene = self.secondary.scene(drivings)
             self.made["simulation"] = SimulationStage(self.secondary, scene, self.engines).run(self.progress)
+            self.remarks.add(self.own_work(scene), made=self.made["simulation"])
         return scene
+
+    def own_work(self, scene: SimulationScene) -> list[str]:
+        """Return a note of the elements that Blender, asked to simulate, leaves to our own engines."""
+        if self.secondary.section.engine == "pegbar":
+            return []
+        shares = [share for engine, share in assign(scene, self.engines) if not isinstance(engine, BlenderEngine)]
+        left = ", ".join(element.name for share in shares for element in share)
+        return [f"Blender cannot simulate {left}: pegbar's own engines do"] if left else []
 
     def frames(self, drivings: list[Driving], scene: SimulationScene) -> ElementsStage:
         """Return the stage that renders and composites, frame by frame."""

@@ -46,6 +46,7 @@ def cloth_entry(
         "triangles": cloth.triangles,
         "seams": cloth.seams,
         "rest": np.asarray(cloth.rest),
+        "stiff": np.empty(0, np.int64),
         "pins": pins,
         "places": places,
         "launch": launch,
@@ -53,6 +54,7 @@ def cloth_entry(
     }
     entry = {
         "name": name,
+        "points": len(cloth.vertices),
         "settings": settings_of(cloth, substeps, scene.frame_rate),
         "sewn": bool(len(cloth.seams)),
         "pulls": False,
