@@ -125,7 +125,7 @@ frames = {_quoted(_relative(drawings, folder))}
 {_line("labels", values)}
 {_line("annotations", values)}
 matte = "auto"               # auto, ink, unmix, fill or alpha
-# hold = 2                   # each drawing is shown for two frames
+# hold = 2                   # each drawing is shown for two frames; then take the line frames = ... above away
 # tolerance = 30             # limb colours that are scanned or antialiased
 
 # [drawing.palette]          # further colours and the limbs that they belong to
