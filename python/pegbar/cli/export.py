@@ -16,6 +16,7 @@ _ALL = "usd,gltf,npz,blender,exposure"
 
 def export(
     shot: Path,
+    /,
     *,
     output: Annotated[
         Path | None, Parameter(name=["--output", "-o"], help="Folder (default: export, beside the shot file).")
@@ -38,9 +39,10 @@ def export(
         raise ValueError(lacking[0])
     folder = output or shot.absolute().parent / "export"
     with bars() as tell:
-        scene, notes = shot_scene(Tracked(shot, overwrite, folder), tell)
-    for note in [*notes, *export_notes(scene, usable)]:
-        print(f"pegbar: note: {note}", file=sys.stderr)
+        scene, remarks = shot_scene(Tracked(shot, overwrite, folder), tell)
+    remarks.add(export_notes(scene, usable), made=True)
+    for line in remarks.lines(shot):
+        print(f"pegbar: {line}", file=sys.stderr)
     written = write_shot(folder, scene, usable)
     width, height = scene.image_size
     print(

@@ -25,6 +25,7 @@ _Program = Literal["pegbar", "blender"]
 
 def secondary(
     shot: Path,
+    /,
     options: BatchOptions | None = None,
     *,
     engine: Annotated[_Program | None, Parameter(help="What simulates (default: the shot file's).")] = None,
@@ -52,16 +53,16 @@ def _run(stage: SecondaryStage, options: BatchOptions) -> int:
     with bars() as tell:
         stage.progress = tell
         drivings = stage.drive()
-        for note in dict.fromkeys(stage.notes):
-            print(f"pegbar: note: {note}", file=sys.stderr)
-        for warning in dict.fromkeys(stage.warnings):
-            print(f"pegbar: warning: {warning}", file=sys.stderr)
+        for line in stage.remarks.lines(stage.path):
+            print(f"pegbar: {line}", file=sys.stderr)
         print(f"volumes: {_made(stage, 'volumes')}, in {os.path.relpath(stage.secondary.folder)}")
         try:
             scene = stage.simulate(drivings)
         except (SimulationError, BlenderError) as error:
             print(f"pegbar: {error}; what was made before is kept", file=sys.stderr)
             return 1
+    for note in stage.own_work(scene) if stage.made["simulation"] else ():
+        print(f"pegbar: note: {note}", file=sys.stderr)
     print(f"simulation: {scene.frames} frames {_made(stage, 'simulation')}")
     frames = stage.frames(drivings, scene)
     if code := _render(stage, frames, options):
