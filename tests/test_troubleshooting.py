@@ -120,7 +120,8 @@ PROVOKE = {
     "cannot be read": cut_clip,
     "ends inside the hierarchy": cut_clip,
     "faster than people": fast_dance,
-    "Unknown option": lambda shot: ["check", shot, "--frame", "1"],
+    "no option": lambda shot: ["check", shot, "--frame", "1"],
+    "is missing": lambda shot: ["match", shot.parent / "marks.json"],
     "the shot has no frame": lambda shot: ["check", shot, "--frames", "1-9"],
     "WIDTHxHEIGHT": lambda shot: ["animate", "a.png", "--clip", "a.bvh", "-o", "a.gif", "--size", "500"],
     "want a suffix": lambda shot: [

@@ -9,12 +9,13 @@ from pegbar.scene.volumes import TaperedCylinders
 from pegbar.simulate.blender.engine import BlenderEngine
 from pegbar.simulate.blender.locate import Blender
 from pegbar.simulate.cache import MemoryCache
+from pegbar.simulate.chains import Bobs
 from pegbar.simulate.cloth import ClothEngine
 from pegbar.simulate.elements import Balls, Boxes, Cloth, Pin, Prop, Strands
 from pegbar.simulate.engine import simulate_scene
-from pegbar.simulate.materials import Wind
+from pegbar.simulate.materials import StrandMaterial, Wind
 from pegbar.simulate.measures import measure_cloth, measure_particles, measure_strands
-from pegbar.simulate.particles import FALLING, SETTLED
+from pegbar.simulate.particles import DROPLET, FALLING, SETTLED, SLIDING, ParticleEngine
 from pegbar.simulate.scene import Character, PreRoll, SimulationScene
 from pegbar.simulate.strands import StrandEngine
 from pegbar.simulate.weather import ParticleMaterial, Particles
@@ -190,20 +191,74 @@ def test_snow_falls_evenly_with_the_wind_and_rides_on_a_limb(blender: Blender) -
     assert np.array_equal(last["positions"], caches[1].read("snow", 19)["positions"])
 
 
-def test_rain_ends_where_it_falls(blender: Blender) -> None:
-    rain = Particles("rain", (-1, 0, -1), (1, 2, 1), 300, ParticleMaterial(terminal_velocity=7.0, stick=0.0))
+def test_rain_bursts_where_it_falls(blender: Blender) -> None:
+    material = ParticleMaterial(terminal_velocity=7.0, run_off=0.25, splash=3)
+    rain = Particles("rain", (-1, 0, -1), (1, 2, 1), 300, material)
     roof = post(8, start=(-2, 1.0, 0), end=(2, 1.0, 0), radius=0.5)
     scene = SimulationScene(24, 8, (rain,), (roof,), ground=0.0)
-    cache = MemoryCache()
-    simulate_scene(scene, cache, [BlenderEngine(blender)])
-    state = cache.read("rain", 7)
-    places = state["positions"]
-    assert (state["codes"][:, 2] == FALLING).all()
-    assert np.allclose(np.median(state["velocities"], axis=0), [0, -7, 0], atol=0.1)
-    above = (places[:, 1] > 1.6).sum()
-    assert above > 30
+    caches = [MemoryCache(), MemoryCache()]
+    for cache, engine in zip(caches, (BlenderEngine(blender), ParticleEngine()), strict=True):
+        simulate_scene(scene, cache, [engine])
+    state = caches[0].read("rain", 7)
+    places, phases = state["positions"], state["codes"][:, 2]
+    falls = places[phases == FALLING]
+    assert np.allclose(np.median(state["velocities"][phases == FALLING], axis=0), [0, -7, 0], atol=0.1)
+    assert (falls[:, 1] > 1.6).sum() > 30
     # Under the roof it is dry.
-    assert ((places[:, 1] < 0.8) & (np.abs(places[:, 2]) < 0.4)).sum() == 0
+    assert ((falls[:, 1] < 0.8) & (np.abs(falls[:, 2]) < 0.4)).sum() == 0
+    droplets = places[phases == DROPLET]
+    assert (np.hypot(droplets[:, 1] - 1, droplets[:, 2]) > 0.5 - 0.01).all()
+    assert ((droplets[:, 1] > 1) & (np.abs(droplets[:, 2]) < 0.5)).sum() > 40
+    assert (phases == SLIDING).sum() > 10
+    # As many as of our own rain, from the first frame on.
+    for frame in (0, 7):
+        ours, theirs = ((cache.read("rain", frame)["codes"][:, 2] == DROPLET).sum() for cache in reversed(caches))
+        assert theirs == pytest.approx(ours, rel=0.2)
+
+
+@pytest.mark.parametrize(("density", "wind", "level"), [(0.5, (1.0, 0, 0), False), (600.0, (0, 0, 0), True)])
+def test_bobs_rise_swing_and_lean_as_ours(
+    blender: Blender, density: float, wind: tuple[float, float, float], level: bool
+) -> None:
+    # A balloon that the wind leans over, and a weight that swings down from where its string is level.
+    radius = 0.15 if density < 1 else 0.03
+    way = np.array([1.0, 0, 0]) if level else np.array([0, 1.0, 0])
+    points = np.append(np.linspace(0, 0.8, 20), 0.8 + 1.15 * radius)[:, None] * way + (0, 1.5, 0)
+    strands = Strands(
+        *("balloon", points, np.array([21]), np.array([0.0015]), (Pin("world", vertices=np.arange(1)),)),
+        bobs=Bobs(np.array([radius]), density),
+        material=StrandMaterial(density=400.0),
+    )
+    scene = SimulationScene(24, 24, (strands,), pre_roll=STILL, wind=Wind(wind, 0.0))
+    found = {}
+    for engine in (StrandEngine(), BlenderEngine(blender)):
+        cache = MemoryCache()
+        simulate_scene(scene, cache, [engine])
+        found[engine.name] = track(cache, "balloon", 24)
+    ours, theirs = found["strands"][:, -1], found["blender"][:, -1]
+    assert np.linalg.norm(ours[-1] - ours[0]) > 0.15
+    assert np.linalg.norm(ours - theirs, axis=1).max() < 0.05
+    links = np.linalg.norm(np.diff(found["blender"], axis=1), axis=2)
+    assert np.abs(links.sum(axis=1) / strands.link_lengths.sum() - 1).max() < 0.01
+    assert np.abs(links[:, -1] / (1.15 * radius) - 1).max() < 0.01
+
+
+def test_bobs_keep_clear_of_each_other_and_of_a_limb(blender: Blender) -> None:
+    # Balloons whose strings are held at one place rise against each other, and under a bar.
+    begin = np.array([[-0.2, 0, 0], [0.2, 0, 0], [0, 0, 0.25]])
+    rows = [np.linspace((0, 0.2, 0), (x, 0.6, z), 10) for x, _, z in begin]
+    points = np.concatenate([np.vstack([row, row[-1] + (0, 0.17, 0)]) for row in rows])
+    pin = Pin("world", vertices=np.array([0, 11, 22]))
+    bobs = Bobs(np.full(3, 0.15), 0.4)
+    strands = Strands("bunch", points, np.full(3, 11), np.full(3, 0.0015), (pin,), bobs=bobs)
+    bar = post(24, start=(-0.6, 1.1, 0), end=(0.6, 1.1, 0))
+    cache = MemoryCache()
+    simulate_scene(SimulationScene(24, 24, (strands,), (bar,), pre_roll=STILL), cache, [BlenderEngine(blender)])
+    centers = track(cache, "bunch", 24)[:, 10::11]
+    apart = [np.linalg.norm(centers[:, a] - centers[:, b], axis=1).min() for a, b in ((0, 1), (1, 2), (0, 2))]
+    # Flat between their vertices, balls come a little nearer than round ones.
+    assert min(apart) > 0.285
+    assert np.hypot(centers[..., 1] - 1.1, centers[..., 2]).min() > 0.24
 
 
 def test_the_same_bits_every_time_and_a_run_that_is_taken_up(blender: Blender) -> None:

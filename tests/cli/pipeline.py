@@ -1,4 +1,4 @@
-"""The whole batch as one process that can be killed at any moment: dots to depth, lift, secondary motion, animate."""
+"""The whole batch as one process that can be killed at any moment: from aligning to composite, export and animate."""
 
 import json
 import re
@@ -14,8 +14,10 @@ import sys
 from pegbar.cli.main import main
 if __name__ == "__main__":
     shot, folder, *jobs = sys.argv[1:]
-    for command in ("align", "secondary", "lift", "depth", "composite"):
-        if code := main([command, shot, *(jobs if command not in ("align", "lift") else ())]):
+    passes = f"{folder}/passes/passes.####.exr"
+    for command in ("align", "import-passes", "secondary", "lift", "depth", "composite", "export"):
+        options = {"import-passes": [passes], "secondary": jobs, "depth": jobs, "composite": jobs}
+        if code := main([command, shot, *options.get(command, ())]):
             sys.exit(code)
     picture = [f"{folder}/drawings/dancer.0001.png", "--joints", f"{folder}/annotation.json"]
     sys.exit(main(["animate", *picture, "--clip", f"{folder}/clip.bvh", "-o", f"{folder}/animated.gif"]))

@@ -90,6 +90,15 @@ def test_init_writes_a_shot_that_works(tmp_path, capsys, told_by):
     assert run("init", tmp_path, "--overwrite") == 0
 
 
+def test_init_takes_the_marks_frame_rate_or_leaves_it_open(tmp_path):
+    make_shot(tmp_path).unlink()
+    for rate, line in ((None, "# frame_rate = 24 "), (12.5, "frame_rate = 12.5\n")):
+        marks = dataclasses.replace(read_annotations(tmp_path / "marks.json"), frame_rate=rate)
+        write_annotations(tmp_path / "marks.json", marks)
+        assert run("init", tmp_path, "--overwrite", "--drawings", "d.####.png") == 0
+        assert f"\n{line}" in (tmp_path / "shot.toml").read_text()
+
+
 def test_init_says_what_it_cannot_find(tmp_path, capsys):
     assert run("init", tmp_path / "none") == 2
     assert run("init", tmp_path) == 2

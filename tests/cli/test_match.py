@@ -181,3 +181,55 @@ def test_a_picture_that_is_missing_leaves_the_sheet_with_the_marks(tmp_path, cli
     assert code == 0
     assert "warning:" in err
     assert (tmp_path / "out" / "match.png").stat().st_size > 0
+
+
+def test_drawings_are_counted_as_their_files_are(tmp_path, clips, capsys):
+    files = tuple(tmp_path / f"d.{number:04d}.png" for number in range(100, 120))
+    marks = annotate(tmp_path / "a.json", drawn(dance_clip(), 40, 20, 60), images=files)
+    assert run(capsys, marks, clips, "--frames", "100-119")[0] == 0
+    code, _, err = run(capsys, marks, clips, "--frames", "1-20")
+    assert (code, err) == (2, "pegbar: --frames: there is no drawing 1-20 (there are 100-119)\n")
+
+
+def test_the_frame_rate_that_was_found_is_told_and_written(tmp_path, clips, capsys):
+    # 24 drawings a second of a clip of 120 frames: every fifth.
+    shot = tmp_path / "shot.toml"
+    marks = annotate(tmp_path / "a.json", drawn(dance_clip(), 40, 30, 60), frame_rate=None)
+    found = (
+        "No frame rate is given: 8, 12 and 24 frames a second were tried; 24 is nearest to the clip's own pace "
+        "(or say --frame-rate).\n"
+    )
+    _, out, _ = run(capsys, marks, clips)
+    assert found in out
+    assert "[shot]\nframe_rate = 24\n\n[clip]\n" in out
+    shot.write_text(SHOT.replace("frame_rate", "# frame_rate").replace("= 24", "= 12"))
+    _, out, _ = run(capsys, marks, clips, "--write", shot)
+    assert found in out
+    assert f"match: wrote [clip] and frame_rate = 24 to {shot}" in out
+    assert load_shot(shot).shot.frame_rate == 24
+    # What the shot file says now is not looked for any more.
+    _, out, _ = run(capsys, marks, clips, "--write", shot)
+    assert f"24 frames a second ({shot}).\n" in out
+    assert f"match: wrote [clip] to {shot}" in out
+
+
+def test_the_frame_rate_that_is_given_is_told_and_written(tmp_path, clips, capsys):
+    shot = tmp_path / "shot.toml"
+    shot.write_text(SHOT)
+    marks = annotate(tmp_path / "a.json", drawn(dance_clip(), 40, 30, 60))
+    _, out, _ = run(capsys, marks, clips, "--write", shot)
+    assert f"{RATE:g} frames a second (as marked).\n" in out
+    _, out, _ = run(capsys, marks, clips, "--frame-rate", "20", "--write", shot)
+    assert "20 frames a second (--frame-rate).\n" in out
+    assert "and frame_rate = 20 to" in out
+    assert load_shot(shot).shot.frame_rate == 20
+
+
+def test_drawings_on_twos_take_twice_as_long_as_the_shot_file_says(tmp_path, clips, capsys):
+    shot = tmp_path / "shot.toml"
+    shot.write_text(SHOT + "hold = 2\n")
+    marks = annotate(tmp_path / "a.json", drawn(dance_clip(), 40, 40, 60)[::2], frame_rate=None)
+    _, out, _ = run(capsys, marks, clips, "--write", shot)
+    assert f"24 frames a second ({shot}), drawings held for 2 frames.\n" in out
+    clip = load_shot(shot).clip
+    assert (clip.start, clip.stop) == (pytest.approx(40, abs=2), pytest.approx(40 + 39 * 5, abs=7))

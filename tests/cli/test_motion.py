@@ -59,6 +59,44 @@ def test_a_broken_file_does_not_hide_the_others(clip, tmp_path, capsys):
     assert capsys.readouterr().out == ""
 
 
+def test_a_folder_is_looked_through_with_those_below(clip, capsys):
+    below = clip.parent / "runs/fast"
+    below.mkdir(parents=True)
+    (below / "walk.BVH").write_text(bvh(unit=0.01))
+    (below / "broken.bvh").write_text("HIERARCHY\n")
+    (below / "notes.txt").write_text("no clip")
+    assert run("info", clip.parent, "--unit", "0.02") == 1
+    out, err = capsys.readouterr()
+    rows = [line.split()[0] for line in out.splitlines()[1:]]
+    # By their paths, also in what is said of them: two clips may have one name.
+    assert rows[:2] == ["runs/fast/walk.BVH", "walk.bvh"]
+    assert {"runs/fast/walk.BVH:", "walk.bvh:"} <= set(rows[2:])
+    assert err.startswith(f"pegbar: {below / 'broken.bvh'}")
+    assert len(err.splitlines()) == 1
+    assert run("info", clip.parent, clip, "--json") == 1
+    assert len(json.loads(capsys.readouterr().out)) == 3
+
+
+def test_a_note_on_many_clips_stands_once(clip, capsys):
+    for number in range(3):
+        clip.with_name(f"b{number}.bvh").write_text(clip.read_text())
+    assert run("info", clip.parent, "--unit", "0.02") == 0
+    lines = capsys.readouterr().out.splitlines()[5:]
+    assert lines == ["4 clips (b0.bvh, b1.bvh, b2.bvh, ...): the person would be 3.38 m tall: the unit may be wrong"]
+    clip.unlink()
+    assert run("info", clip.parent, "--unit", "0.02") == 0
+    lines = capsys.readouterr().out.splitlines()[4:]
+    assert [line.partition(":")[0] for line in lines] == ["b0.bvh", "b1.bvh", "b2.bvh"]
+
+
+def test_a_folder_without_clips_is_named(tmp_path, clip, capsys):
+    (tmp_path / "none").mkdir()
+    assert run("info", tmp_path / "none") == 2
+    assert capsys.readouterr().err == f"pegbar: {tmp_path / 'none'}: no .bvh, .amc, .c3d file here or below\n"
+    assert run("info", tmp_path, "--joints", tmp_path / "map.toml") == 2
+    assert f"--joints: want one clip, got the folder {tmp_path}" in capsys.readouterr().err
+
+
 def test_json_has_everything(clip, tmp_path, capsys):
     assert run("info", "--json", clip, tmp_path / "none.bvh") == 1
     good, bad = json.loads(capsys.readouterr().out)

@@ -42,7 +42,7 @@ def test_every_stage_makes_its_frame(sample, capsys):
     assert main(["import-passes", str(sample), str(folder / "passes/passes.####.exr"), "--check"]) == 0
     clip = ["--joints", str(folder / "annotation.json"), "--clip", str(folder / "clip.bvh")]
     assert main(["animate", str(folder / "drawings/dancer.0001.png"), *clip, "-o", str(folder / "one.gif")]) == 0
-    assert main(["match", str(folder / "annotation.json"), "--clips", str(folder)]) == 0
+    assert main(["match", str(folder / "annotation.json"), str(folder)]) == 0
 
 
 @pytest.mark.parametrize("hold", [1, 6])

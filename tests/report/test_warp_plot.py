@@ -18,3 +18,19 @@ def test_costs_path_and_times_are_drawn():
         warp_picture(cost[1:], warp)
     with pytest.raises(ValueError, match="^size: "):
         warp_picture(cost, warp, size=(0, 10))
+
+
+def test_costs_of_a_long_shot_may_be_thinned():
+    cost = abs(np.arange(120.0)[:, None] - np.arange(202.0) / 2) + 0.1
+    warp = time_warp(cost)
+    whole, thin = (
+        warp_picture(cost[::rows, ::columns], warp, thinned=(rows, columns)).astype(int)[..., :3]
+        for rows, columns in ((1, 1), (2, 3))
+    )
+    assert whole.shape == thin.shape
+    # The axes end with the last thinned column, one clip frame later.
+    assert np.abs(whole - thin).mean() < 6
+    with pytest.raises(ValueError, match="^cost: want shape"):
+        warp_picture(cost, warp, thinned=(2, 3))
+    with pytest.raises(ValueError, match="^thinned: "):
+        warp_picture(cost, warp, thinned=(0, 1))

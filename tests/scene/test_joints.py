@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 from pegbar import map_joints
 from pegbar.scene.body import MARKERS
 from pegbar.scene.joint_names import MIDDLE, SIDED, compact
+from pegbar.scene.joints import misspelt_markers
 from tests.skeletons import BIPED, SCHEMES, person
 
 
@@ -187,3 +188,25 @@ def test_arguments_that_do_not_fit_are_named(parents, rest, problem):
 def test_a_name_without_letters_is_nothing():
     assert compact("__:--") == ""
     assert map_joints(["", "__", "Hips"]) == {"pelvis": "Hips"}
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [
+        ("left_elbwo", "left_elbow"),
+        ("LeftElbow", "left_elbow"),
+        ("Left_Elbow", "left_elbow"),
+        ("left-elbow", "left_elbow"),
+        # What else people mark, and the markers that a drawing need not have.
+        ("tail", None),
+        ("left_elbow_tip", None),
+        ("left_ear", None),
+        ("left_wrist", None),
+    ],
+)
+def test_misspelt_markers_are_told_from_others(name, meant):
+    names = [name if marker == "left_elbow" else marker for marker in MARKERS]
+    assert misspelt_markers(names) == ({name: meant} if meant else {})
+    # Not where the marker itself is there too, or the clip has a joint of that name.
+    assert misspelt_markers([*names, "left_elbow"]) == {}
+    assert misspelt_markers(names, {name}) == {}

@@ -9,8 +9,10 @@ from pegbar import read_annotations, write_annotations
 from pegbar.cli.main import main
 from pegbar.errors import FormatError, ShotError
 from pegbar.io.alignment import read_alignment
+from pegbar.io.frames import read_image, write_image
 from pegbar.sample.shot import write_sample
 from pegbar.shot.align_stage import AlignStage
+from pegbar.shot.drawn import check_drawing
 from pegbar.shot.plan import open_shot
 from tests.pages import complaints
 
@@ -30,6 +32,12 @@ def made(tmp_path_factory):
     assert read_annotations(folder / "annotation.json").depths is None
     assert main(["align", str(shot)]) == 0
     return shot
+
+
+def copy(shot, folder):
+    """The shot for a test that changes it."""
+    shutil.copytree(shot.parent, folder / "copy")
+    return folder / "copy" / shot.name
 
 
 def test_depth_order_of_the_limbs_is_the_truths(made):
@@ -225,6 +233,84 @@ def test_a_clip_that_is_not_there_is_named_with_key_and_line(made, capsys):
         assert "clap.bvh: no such file" in line
     finally:
         made.write_text(text)
+
+
+def test_what_align_told_is_not_told_again_by_what_builds_on_it(made, tmp_path, capsys):
+    made = copy(made, tmp_path)
+    assert main(["align", str(made), "--overwrite"]) == 0
+    told = capsys.readouterr().err.splitlines()
+    assert any(line.startswith("pegbar: note: ") for line in told)
+    assert main(["align", str(made)]) == 0
+    assert capsys.readouterr().err.splitlines() == told
+    for command in ("lift", "export"):
+        assert main([command, str(made)]) == 0
+        again = capsys.readouterr().err.splitlines()
+        assert not set(told) & set(again), command
+    # Where it is aligned on the way, it is told.
+    (made.parent / "align/alignment.npz").unlink()
+    assert main(["lift", str(made)]) == 0
+    assert set(told) <= set(capsys.readouterr().err.splitlines())
+
+
+def test_a_note_on_the_clip_names_its_file(made, tmp_path, test_data, capsys):
+    shot = copy(made, tmp_path)
+    # An AMC file says no frame rate.
+    clip = test_data / "mocap/asfamc/16_11.amc"
+    shot.write_text(shot.read_text().replace('path = "clip.bvh"', f"path = {json.dumps(str(clip))}"))
+    main(["align", str(shot)])
+    assert "pegbar: note: 16_11.amc: it says no frame rate: 120 frames a second assumed\n" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("source", ["shot.size", "as the joint marks say"])
+def test_drawings_of_another_size_are_named_and_not_their_labels(made, tmp_path, capsys, source):
+    shot = copy(made, tmp_path)
+    text = shot.read_text()
+    shot.write_text(text if source == "shot.size" else text.replace("\nsize = [240, 136]\n", "\n"))
+    for number in (5, 7):
+        path = shot.parent / f"drawings/dancer.{number:04d}.png"
+        write_image(path, np.pad(read_image(path), ((0, 0), (0, 20), (0, 0))))
+    told = [
+        f"pegbar: {shot.parent / f'drawings/dancer.000{number}.png'}: want 240 x 136 pixels ({source}), got 260 x 136"
+        for number in (5, 7)
+    ]
+    for command in ("align", "secondary", "lift"):
+        assert main([command, str(shot)]) == 2
+        assert capsys.readouterr().err.splitlines() == told, command
+    # What has no header to be read beforehand is refused when it is read.
+    opened = open_shot(shot, aligned=False)
+    with pytest.raises(ShotError, match=r"dancer.0001.png: want 240 x 136 pixels .*, got 136 x 240"):
+        check_drawing(opened, 1, np.zeros((240, 136, 3), np.uint8))
+    check_drawing(opened, 1, np.zeros((136, 240, 3), np.uint8))
+
+
+@pytest.mark.parametrize("clip", ["clip", "no clip"])
+def test_a_misspelt_marker_is_blamed_on_the_annotations_not_on_the_clip(made, tmp_path, capsys, clip):
+    shot = copy(made, tmp_path)
+    marks = shot.parent / "annotation.json"
+    marks.write_text(marks.read_text().replace('"left_elbow"', '"left_elbwo"'))
+    said = "annotation.json: no marker is called 'left_elbwo' (did you mean 'left_elbow'?)"
+    if clip == "no clip":
+        text = shot.read_text()
+        shot.write_text(text[: text.index("[clip]")])
+    assert main(["check", str(shot), "--jobs", "1"]) == 1
+    told = capsys.readouterr().err
+    assert f": drawing.annotations: {said} -> " in told
+    assert "no joint for" not in told
+    assert main(["match", str(marks), str(shot.parent)]) == 2
+    assert capsys.readouterr().err == f"pegbar: {marks.parent}/{said}\n"
+    if clip == "clip":
+        assert main(["align", str(shot)]) == 2
+        assert capsys.readouterr().err == f"pegbar: {said}\n"
+
+
+def test_so_many_misspelt_markers_that_nothing_can_be_compared(made, tmp_path, capsys):
+    shot = copy(made, tmp_path)
+    marks = shot.parent / "annotation.json"
+    marks.write_text(marks.read_text().replace('"left_', '"let_').replace('"right_', '"rihgt_'))
+    assert main(["align", str(shot)]) == 2
+    assert "annotation.json: no marker is called 'let_shoulder' (did you mean 'left_shoulder'?)" in (
+        capsys.readouterr().err
+    )
 
 
 def test_marks_outside_the_picture_are_warned_of(made, tmp_path, capsys):

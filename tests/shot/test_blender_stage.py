@@ -10,7 +10,7 @@ import pytest
 from pegbar.cli.main import main
 from pegbar.io.exr import read_passes
 from pegbar.sample.shot import write_sample
-from pegbar.shot.secondary_stage import SecondaryStage
+from pegbar.shot.secondary_stage import SecondaryStage, own_work
 from pegbar.simulate.chains import Bobs
 from pegbar.simulate.elements import Balls, Strands
 from pegbar.simulate.engine import assign
@@ -92,15 +92,21 @@ def test_what_blender_lacks_is_simulated_by_our_engines(shot):
     fake_blender(shot.parent)
     elements = [
         Balls("balls", [[0, 1, 0]], [0.1]),
+        Balls("thrown", [[0, 1, 0]], [0.1], velocities=[[1, 0, 0]]),
         Strands("balloon", [[0, 1, 0], [0, 2, 0]], [2], [0.01], bobs=Bobs([0.2])),
+        Strands("bunch", [[0, 1, 0], [0, 2, 0], [1, 1, 0], [1, 2, 0]], [2, 2], [0.01, 0.01], bobs=Bobs([0.1, 0.3])),
         Strands("rope", [[0, 1, 0], [0, 2, 0]], [2], [0.01]),
         Particles("snow", (0, 0, 0), (1, 1, 1), 5),
         Particles("drops", (0, 0, 0), (1, 1, 1), 0),
     ]
-    shares = assign(SimulationScene(24, 2, elements), SecondaryStage(shot, engine="blender").engines)
+    engines, scene = SecondaryStage(shot, engine="blender").engines, SimulationScene(24, 2, elements)
+    shares = assign(scene, engines)
+    assert own_work(scene, engines) == ["Blender cannot simulate thrown, bunch, drops: pegbar's own engines do"]
+    assert own_work(scene, SecondaryStage(shot).engines) == []
     assert {engine.name: [element.name for element in share] for engine, share in shares} == {
-        "blender": ["balls", "rope", "snow"],
-        "strands": ["balloon"],
+        "blender": ["balls", "balloon", "rope", "snow"],
+        "rapier": ["thrown"],
+        "strands": ["bunch"],
         "particles": ["drops"],
     }
 

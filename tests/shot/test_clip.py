@@ -88,3 +88,29 @@ def test_wrong_clips_are_refused(tmp_path, line, said):
     shot.write_text(f'{DRAWING}[clip]\npath = "a.bvh"\n{line}\n')
     with pytest.raises(ShotError, match=said):
         load_shot(shot)
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ("[shot]\nframe_rate = 24   # film\n", "[shot]\nframe_rate = 12   # film\n"),
+        ("[shot]\n# frame_rate = 24   # left open\nname = 'a'\n", "[shot]\nframe_rate = 12\nname = 'a'\n"),
+        ("[shot]\nname = 'a'\n", "[shot]\nframe_rate = 12\nname = 'a'\n"),
+        ("", "[shot]\nframe_rate = 12\n\n"),
+        # Another section's rate is not the shot's.
+        ("[shot]\n[lift]\nframe_rate = 60\n", "[shot]\nframe_rate = 12\n[lift]\nframe_rate = 60\n"),
+    ],
+)
+def test_the_frame_rate_is_written_where_it_belongs(tmp_path, before, after):
+    path = tmp_path / "shot.toml"
+    path.write_text(before + DRAWING)
+    write_clip(path, CHOICE, frame_rate=12.0)
+    assert path.read_text() == f"{after}{DRAWING}\n{clip_text(CHOICE)}"
+    assert load_shot(path).shot.frame_rate == 12
+
+
+def test_without_a_frame_rate_the_shots_own_stays(tmp_path):
+    path = tmp_path / "shot.toml"
+    path.write_text("[shot]\nframe_rate = 24\n" + DRAWING)
+    write_clip(path, CHOICE)
+    assert load_shot(path).shot.frame_rate == 24

@@ -127,3 +127,21 @@ def test_colours_without_a_joint_and_misspelt_joints_are_named_before_dots_are_r
 def test_joints_of_ones_own_may_be_like_known_ones():
     assert dots_stage._problem({"#ff0000": "left_hand", "#00ff00": "left_hand2", "#0000ff": "tail"}) is None
     assert "no colour has a joint yet" in (dots_stage._problem({}) or "")
+
+
+@pytest.mark.parametrize(
+    ("lines", "rate", "holds"),
+    [("", None, ()), ("[shot]\nframe_rate = 12\n", 12.0, ()), ("hold = 2\n", None, (2,) * 7)],
+)
+def test_marks_say_how_fast_the_drawings_run_as_far_as_the_shot_does(tmp_path, lines, rate, holds):
+    make(tmp_path)
+    shot = tmp_path / "shot.toml"
+    text = shot.read_text()
+    shot.write_text(lines + text if lines.startswith("[") else text.replace("[drawing]\n", f"[drawing]\n{lines}"))
+    assert main(["dots", str(shot)]) == 0
+    marks = read_annotations(tmp_path / "marks.json")
+    assert (marks.frame_rate, marks.holds) == (rate, holds)
+    # A new rate or hold is written at the next run.
+    shot.write_text("[shot]\nframe_rate = 30\n" + text)
+    assert main(["dots", str(shot)]) == 0
+    assert read_annotations(tmp_path / "marks.json").frame_rate == 30

@@ -16,7 +16,7 @@ from pegbar.simulate.blender.cloth import UNIT, cloth_entry, colliders, settings
 from pegbar.simulate.blender.engine import BlenderEngine, limb_arrays
 from pegbar.simulate.blender.locate import Blender, find_blender
 from pegbar.simulate.blender.render import BlenderJob, camera_of, passes_of, squared, welded
-from pegbar.simulate.blender.strands import strand_settings, strands_entry
+from pegbar.simulate.blender.strands import Web, strand_settings, strands_entry
 from pegbar.simulate.cache import MemoryCache
 from pegbar.simulate.chains import Bobs
 from pegbar.simulate.elements import Balls, Boxes, Cloth, Pin, Strands
@@ -213,22 +213,26 @@ def test_strands_are_told_as_slivers_with_the_wind_as_a_pull():
 
 
 def test_a_strands_material_in_blenders_terms():
-    found = strand_settings(tassel(material=StrandMaterial(bend=1e-4, stretch=0.01, drag=0.0)), 16, 24.0)
+    strands = tassel(material=StrandMaterial(bend=1e-4, stretch=0.01, drag=0.0))
+    found = strand_settings(strands, Web(strands), 16, 24.0)
     # Four links of 0.1 m and two springs over two.
     length = (4 * 0.1 + 2 * 0.2) / 6
     assert found["mass"] == pytest.approx(np.pi * 0.01**2 * 0.4 * 800 / 6)
     assert found["tension_stiffness"] / length == pytest.approx(0.001 * 10 / 0.01 / 0.1)
     assert found["compression_stiffness"] / length == pytest.approx(0.001 * 16 * 1e-4 / 0.1**3 / 0.25)
     assert found["air_damping"] == pytest.approx(100 * UNIT * found["mass"] * 0.3)
-    stiff = strand_settings(tassel(material=StrandMaterial(bend=10.0)), 16, 24.0)
-    assert stiff["compression_stiffness"] == stiff["tension_stiffness"] == pytest.approx(length * 0.001 * 1e4 / 0.1)
+    stiff = strand_settings(tassel(material=StrandMaterial(bend=10.0)), Web(strands), 16, 24.0)
+    # No stiffer than to grow by 0.2% under five times the weight of one of the two.
+    pull = 5 * 9.81 * np.pi * 0.01**2 * 0.2 * 800 / 0.002
+    assert stiff["compression_stiffness"] == stiff["tension_stiffness"] == pytest.approx(length * 0.001 * pull / 0.1)
 
 
-def test_strands_with_bobs_are_refused_by_name():
+def test_strands_with_bobs_that_differ_are_refused_by_name():
     engine = BlenderEngine(Blender("blender", False, "5.0.1"))
     assert engine.supports(tassel())
+    assert engine.supports(tassel(bobs=Bobs(np.array([0.05, 0.05]))))
     with pytest.raises(ValueError, match=r"blender cannot simulate tassel \(Strands\)"):
-        simulate_scene(scene_of(tassel(bobs=Bobs(np.array([0.05, 0.05])))), MemoryCache(), [engine])
+        simulate_scene(scene_of(tassel(bobs=Bobs(np.array([0.05, 0.08])))), MemoryCache(), [engine])
 
 
 WRITES = """

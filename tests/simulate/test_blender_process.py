@@ -54,10 +54,19 @@ def test_the_setting_is_preferred_then_the_variable_then_the_path(
     assert find_blender("blender", folder=tmp_path / "shot").version == "4.5.3"
 
 
-@pytest.mark.parametrize("version", ["4.4.9", "2.93.0", "3.6.2"])
+@pytest.mark.parametrize("version", ["3.3.9", "2.93.0"])
 def test_an_old_blender_is_refused(tmp_path: Path, version: str) -> None:
-    with pytest.raises(BlenderError, match=rf"Blender {version} is too old: want 4\.5"):
+    with pytest.raises(BlenderError, match=rf"Blender {version} is too old: want 3\.4"):
         find_blender(fake_blender(tmp_path, says=f"Blender {version}"))
+
+
+def test_a_blender_without_what_is_needed_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(BlenderError, match=r"Blender 3\.4\.1 is without numpy: .*python3-numpy\)$"):
+        find_blender(fake_blender(tmp_path, says="Blender 3.4.1", answers="noise\npegbar:lacks numpy\nBlender quit"))
+    with pytest.raises(BlenderError, match=r"without cycles, freestyle: take a build from blender\.org$"):
+        find_blender(fake_blender(tmp_path, answers="pegbar:lacks cycles freestyle"))
+    with pytest.raises(BlenderError, match="runs no scripts: it says 'Error: no Python'"):
+        find_blender(fake_blender(tmp_path, answers="Error: no Python"))
 
 
 def test_what_is_no_blender_is_refused(tmp_path: Path) -> None:

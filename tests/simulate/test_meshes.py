@@ -215,6 +215,10 @@ def test_measures_find_the_deepest_point_and_the_stretch():
     assert measures.penetration[1] == 0
     assert measures.stretch[0] == pytest.approx(0)
     assert measures.stretch[1] == pytest.approx(0.5)
+    later = measure_cloth(scene, cache, "flag", frames=[1, 0])
+    assert later.limb == ("", "left_thigh")
+    np.testing.assert_array_equal(later.penetration, measures.penetration[::-1])
+    np.testing.assert_array_equal(later.stretch, measures.stretch[::-1])
     pinned = replace(cloth, pins=(Pin("world", vertices=np.array([0, 1, 2])),))
     free = measure_cloth(replace(scene, elements=(pinned,)), cache, "flag")
     assert free.penetration[0] == 0

@@ -94,6 +94,7 @@ def test_tracks_go_through_their_frames_and_never_beyond_their_neighbours(track,
     before, after = track[int(np.clip(np.floor(time), 0, 4))], track[int(np.clip(np.ceil(time), 0, 4))]
     assert (got >= np.minimum(before, after) - 1e-9).all()
     assert (got <= np.maximum(before, after) + 1e-9).all()
+    np.testing.assert_array_equal(got, at_times(track, np.array([0, time, 4]))[1])
 
 
 def test_one_frame_is_held_and_what_is_never_known_stays_unknown():

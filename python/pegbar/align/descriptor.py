@@ -90,15 +90,31 @@ def limb_trust(markers: ArrayLike, limbs: ArrayLike, *, lengths: ArrayLike | Non
     """
     markers = arrays.floats("markers", markers, (..., "N", 2), allow="nan")
     limbs = arrays.integers("limbs", limbs, ("K", 2), low=0, high=markers.shape[-2] - 1)
-    seen = np.nan_to_num(np.linalg.norm(_along(markers, limbs), axis=-1))
+    seen = _seen_lengths(markers, limbs)
     if lengths is None:
-        full = seen.reshape(-1, len(limbs)).max(axis=0, initial=0)
+        full = longest_seen(markers, limbs)
     else:
         full = arrays.floats("lengths", lengths, (len(limbs),))
         if not (full > 0).all():
             raise ValueError(f"lengths: want positive lengths, got {full.min()} for limb {int(np.argmin(full))}")
     trust: Floats = np.minimum(seen / np.where(full > 0, full, 1), 1)
     return trust
+
+
+def longest_seen(markers: ArrayLike, limbs: ArrayLike) -> Floats:
+    """The longest that each of ``limbs`` (K, 2) is seen in ``markers`` (..., N, 2); 0 for one that never is.
+
+    Raises ValueError as `limb_trust` does.
+
+    Examples
+    --------
+    >>> longest_seen([[[0.0, 0.0], [2.0, 0.0]], [[0.0, 0.0], [0.5, 0.0]]], [[0, 1]]).tolist()
+    [2.0]
+    """
+    markers = arrays.floats("markers", markers, (..., "N", 2), allow="nan")
+    limbs = arrays.integers("limbs", limbs, ("K", 2), low=0, high=markers.shape[-2] - 1)
+    longest: Floats = _seen_lengths(markers, limbs).reshape(-1, len(limbs)).max(axis=0, initial=0)
+    return longest
 
 
 def pose_distance(
@@ -151,6 +167,11 @@ def pose_distance(
     first = _trust("a_trust", a_trust, a) if trusted else none
     second = _trust("b_trust", b_trust, b) if trusted else none
     return _kernels.pose_distance(_one_turn(a), _one_turn(b), factors, first, second)
+
+
+def _seen_lengths(markers: Floats, limbs: NDArray[np.int64]) -> Floats:
+    lengths: Floats = np.nan_to_num(np.linalg.norm(_along(markers, limbs), axis=-1))
+    return lengths
 
 
 def _along(markers: Floats, limbs: NDArray[np.int64]) -> Floats:

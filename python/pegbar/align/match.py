@@ -64,7 +64,7 @@ class Match:
     differences : (F, K) float
         Their angles in degrees, frame by frame.
     drawing_rate : float
-        Drawings a second: as given, or the likeliest of those tried.
+        Film frames a second: as given, or of those tried the nearest to the clip's own pace.
     verdict : {"fits", "doubtful", "no"}
     mixed : dict of str to (n,) int
         "arms" or "legs" -> the drawn frames where these seem to be marked on the wrong sides; for matches that fit.
@@ -262,10 +262,20 @@ def _match(clip: Clip, found: Aligned, marks: Marks, seen: NDArray[np.bool_], li
         cost=cost,
         lines=tuple(line.name for line in marks.lines),
         differences=np.degrees(found.differences)[marks.source],
-        drawing_rate=marks.rates[found.candidate.which],
+        drawing_rate=_pace(times, clip, marks),
         verdict=verdict,
         mixed=_mixed(found, marks) if verdict == "fits" else {},
     )
+
+
+def _pace(times: Floats, clip: Clip, marks: Marks) -> float:
+    """The tried rate at which the clip runs the least faster or slower than it was captured."""
+    # A cycle may begin anywhere: its last drawing is as far from its first as the others are apart.
+    drawn = marks.periods[0] * marks.rates[0] * (1 - 1 / len(marks.source))
+    seconds = float(np.ptp(times)) / clip.frame_rate
+    if drawn <= 0 or seconds <= 0:
+        return marks.rates[0]
+    return min(marks.rates, key=lambda rate: abs(np.log(rate * seconds / drawn)))
 
 
 def _rank(pair: tuple[Clip, Aligned]) -> float:

@@ -20,6 +20,7 @@ _ROOTS = {"in_place": "stays in place", "travel": "travels"}
 
 def align(
     shot: Path,
+    /,
     *,
     overwrite: Annotated[bool, Parameter(negative="", help="Align again what is up to date.")] = False,
 ) -> int:
@@ -32,24 +33,21 @@ def align(
     """
     from pegbar.shot.align_stage import AlignStage
     from pegbar.shot.plan import open_shot
+    from pegbar.shot.remarks import Remarks
 
     stage = AlignStage(open_shot(shot, aligned=False), overwrite)
     with progress("align", len(stage.numbers)) as advance:
         alignment, made = stage.run(lambda _done, _all: advance())
-    print_remarks(alignment)
+    # Whoever aligns again wants to hear it again.
+    remarks = Remarks()
+    remarks.add(alignment.notes, alignment.warnings, made=True)
+    for line in remarks.lines(shot):
+        print(f"pegbar: {line}", file=sys.stderr)
     print(f"align: {summary(alignment)}")
     where = os.path.relpath(stage.folder)
     count = len(stage.numbers)
     print(f"align: {count} drawing{'' if count == 1 else 's'} {'aligned' if made else 'up to date'}, in {where}")
     return 0
-
-
-def print_remarks(alignment: Alignment) -> None:
-    """Print what was assumed, and what looks wrong."""
-    for note in alignment.notes:
-        print(f"pegbar: note: {note}", file=sys.stderr)
-    for warning in alignment.warnings:
-        print(f"pegbar: warning: {warning}", file=sys.stderr)
 
 
 def summary(alignment: Alignment) -> str:

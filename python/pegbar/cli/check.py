@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 def check(
     shot: Path,
+    /,
     *,
     frames: Annotated[str | None, Parameter(help="Frames to check, like 1-48 (default: the shot's).")] = None,
     jobs: Annotated[int | None, Parameter(help="Worker processes (default: one a core).")] = None,

@@ -25,6 +25,7 @@ SHEET = 12
 
 def demo(
     folder: Path,
+    /,
     *,
     length: Annotated[int, Parameter(help="Number of frames that the dance is spread over.")] = 48,
     jobs: Annotated[int | None, Parameter(help="Worker processes (default: one a core).")] = None,

@@ -12,6 +12,7 @@ from cyclopts import Parameter
 
 def dots(
     shot: Path,
+    /,
     *,
     overwrite: Annotated[bool, Parameter(negative="", help="Read the dots again.")] = False,
 ) -> int:

@@ -17,6 +17,7 @@ _ALL = "usd,gltf,npz,blender,exposure"
 
 def export(
     shot: Path,
+    /,
     *,
     output: Annotated[
         Path | None, Parameter(name=["--output", "-o"], help="Folder (default: export, beside the shot file).")
@@ -43,11 +44,12 @@ def export(
     folder = output or shot.absolute().parent / "export"
     tracked = Tracked(shot, overwrite, folder)
     with bars() as tell:
-        scene, notes = shot_scene(tracked, tell)
+        scene, remarks = shot_scene(tracked, tell)
     if camera == "sheet":
         scene = film_scene(scene, tracked)
-    for note in [*notes, *export_notes(scene, usable)]:
-        print(f"pegbar: note: {note}", file=sys.stderr)
+    remarks.add(export_notes(scene, usable), made=True)
+    for line in remarks.lines(shot):
+        print(f"pegbar: {line}", file=sys.stderr)
     with hold(folder):
         written = write_shot(folder, scene, usable)
     width, height = scene.image_size

@@ -9,31 +9,32 @@ from cyclopts import Parameter
 
 
 def init(
-    frames: Path,
+    folder: Path,
+    /,
     *,
     drawings: Annotated[str | None, Parameter(help="The drawn frames, like d.####.png, if there is a choice.")] = None,
     exposure: Annotated[
         Path | None, Parameter(help="An exposure sheet (CSV or XDTS): which frame shows which.")
     ] = None,
-    output: Annotated[Path | None, Parameter(help="The shot file (default: FRAMES/shot.toml).")] = None,
+    output: Annotated[Path | None, Parameter(help="The shot file (default: FOLDER/shot.toml).")] = None,
     overwrite: Annotated[bool, Parameter(negative="", help="Replace a shot file that is there.")] = False,
 ) -> int:
     """Write a shot file for the drawn frames in a folder; see `pegbar init --help`.
 
     Parameters
     ----------
-    frames
+    folder
         The folder with the drawn frames.
     """
     from pegbar.io.atomic import complete_file
     from pegbar.shot.start import start_shot
 
-    if not frames.is_dir():
-        raise NotADirectoryError(f"{frames}: no such folder")
-    target = output or frames / "shot.toml"
+    if not folder.is_dir():
+        raise NotADirectoryError(f"{folder}: no such folder")
+    target = output or folder / "shot.toml"
     if target.exists() and not overwrite:
         raise FileExistsError(f"{target}: is there already (--overwrite replaces it)")
-    text = start_shot(frames, drawings, exposure)
+    text = start_shot(folder, drawings, exposure)
     with complete_file(target) as part:
         part.write_text(text, encoding="utf-8")
     if exposure is not None:

@@ -9,11 +9,12 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from pegbar.cli.align import print_remarks
+from pegbar.cli.batch import progress
 
 
 def lift(
     shot: Path,
+    /,
     *,
     overwrite: Annotated[bool, Parameter(negative="", help="Lift again what is up to date.")] = False,
 ) -> int:
@@ -24,16 +25,19 @@ def lift(
     shot
         The shot file.
     """
-    from pegbar.io.alignment import read_alignment
     from pegbar.shot.align_stage import AlignStage
     from pegbar.shot.lift_stage import LiftStage
     from pegbar.shot.plan import open_shot
+    from pegbar.shot.remarks import Remarks
 
-    stage = LiftStage(AlignStage(open_shot(shot, aligned=False)), overwrite)
+    stage, remarks = LiftStage(AlignStage(open_shot(shot, aligned=False)), overwrite), Remarks()
+    with progress("align", len(stage.align.numbers)) as advance:
+        alignment, aligned = stage.align.run(lambda _done, _all: advance())
+    remarks.add(alignment.notes, alignment.warnings, made=aligned)
     values, made = stage.run()
-    print_remarks(read_alignment(stage.align.outputs()[0]))
-    for note in values["notes"]:
-        print(f"pegbar: note: {note}", file=sys.stderr)
+    remarks.add(values["notes"], made=True)
+    for line in remarks.lines(shot):
+        print(f"pegbar: {line}", file=sys.stderr)
     parts = [
         f"markers {values['marker_reprojection_px']:.1f} px and skeleton {values['skeleton_reprojection_px']:.1f} px "
         "from the drawing",

@@ -160,7 +160,9 @@ GROUPS = {
 Frames, rate, unit, up axis, floor, facing, an inserted T-pose, joints found and missing. A clip that cannot be read is
 named and the others are still shown; the exit code is then 1.
 
-Example: pegbar motion info demo/*.bvh
+Folders are looked through with the folders below.
+
+Example: pegbar motion info demo
 
 Example: pegbar motion info demo/clip.bvh --joints demo/joints.toml""",
         "plot": """Draw poses of a clip from the front, the side and above.
@@ -196,7 +198,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         code = app(given, exit_on_error=False, print_error=False, result_action="return_value")
     except CycloptsError as error:
-        return _fail(f"{error} (see pegbar --help)")
+        # Known only where it is needed: help comes without it.
+        from pegbar.cli.usage import describe_usage
+
+        return _fail(describe_usage(error, app))
     except (OSError, MissingExtraError) as error:
         return _fail(describe(error))
     except ValueError as error:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from pegbar.errors import describe
-from pegbar.io.numbers import format_frames, parse_frames
+from pegbar.io.numbers import file_numbers, format_frames, parse_frames
 
 if TYPE_CHECKING:
     import numpy as np
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from pegbar.align.match import Matches
     from pegbar.io.clip_folder import ClipFolder
     from pegbar.scene.drawing import Drawing
+    from pegbar.shot.drawn_timing import Timing
 
 # Drawings and matches on the contact sheet.
 _KEYS, _ROWS = 6, 8
@@ -27,14 +28,15 @@ _KEYS, _ROWS = 6, 8
 def match(
     annotations: Path,
     clips: Path,
+    /,
     *,
     top: Annotated[int, Parameter(help="How many clips and segments to show.")] = 10,
     output: Annotated[
         Path | None, Parameter(name=("--output", "-o"), help="Folder for a contact sheet, match.png.")
     ] = None,
-    frames: Annotated[str | None, Parameter(help="Drawings to look at, counted from 1, like 1-24.")] = None,
+    frames: Annotated[str | None, Parameter(help="Drawings to look at, by their files' numbers, like 1-24.")] = None,
     frame_rate: Annotated[
-        float | None, Parameter(help="Film frames a second, where the annotations do not say.")
+        float | None, Parameter(help="Film frames a second (default: the marks' or shot file's; else found).")
     ] = None,
     write: Annotated[Path | None, Parameter(help="Shot file to put the best clip into.")] = None,
     index: Annotated[bool, Parameter(help="Keep an index, so that clips are read once.")] = True,
@@ -50,38 +52,47 @@ def match(
     """
     from pegbar.io.annotations import read_annotations
     from pegbar.report.match_table import report_left_out, report_matches
-    from pegbar.shot.load import load_shot
+    from pegbar.scene.joints import misspelt_markers
+    from pegbar.shot.drawn_timing import drawn_timing
 
     if frame_rate is not None and not frame_rate > 0:
         raise ValueError(f"--frame-rate: want frames a second above 0, got {frame_rate}")
-    if write is not None:
-        load_shot(write)
     if annotations.suffix.lower() == ".toml":
         raise ValueError(f"{annotations}: a shot file; want its joint marks, which drawing.annotations names")
     drawing = read_annotations(annotations)
-    chosen = _chosen(frames, len(drawing.markers))
+    if wrong := misspelt_markers(drawing.names):
+        known = ", ".join(f"{name!r} (did you mean {near!r}?)" for name, near in wrong.items())
+        raise ValueError(f"{annotations}: no marker is called {known}")
+    timing = drawn_timing(drawing, write, frame_rate)
+    chosen = _chosen(frames, _numbers(drawing))
     folder = _read(clips, index)
     if not folder.clips:
         report_left_out(folder.broken, folder.skipped)
         print(f"pegbar: {clips}: no clip that can be used", file=sys.stderr)
         return 1
-    found = _search(drawing, chosen, folder, frame_rate, top)
+    found = _search(drawing, chosen, folder, timing, top)
     report_left_out(folder.broken, {**folder.skipped, **found.skipped})
-    report_matches(folder, found, [place + 1 for place in chosen])
+    words = timing.words(found.matches[0].drawing_rate) if found.matches else ""
+    report_matches(folder, found, words, [_numbers(drawing)[place] for place in chosen])
     if output is not None and found.matches:
         _write_sheet(output, drawing, chosen, folder, found)
-    _write_choice(write, clips, found)
+    _write_choice(write, clips, found, timing)
     return 0
 
 
-def _chosen(frames: str | None, count: int) -> list[int]:
+def _numbers(drawing: Drawing) -> list[int]:
+    """The drawings' numbers, as their files have them; counted from 1 where they have none."""
+    return file_numbers(drawing.images) or list(range(1, len(drawing.markers) + 1))
+
+
+def _chosen(frames: str | None, numbers: list[int]) -> list[int]:
     """Indices of the drawings to look at."""
     if frames is None:
-        return list(range(count))
+        return list(range(len(numbers)))
     wanted = sorted(parse_frames(frames))
-    if strange := [number for number in wanted if not 1 <= number <= count]:
-        raise ValueError(f"--frames: there is no drawing {format_frames(strange)} (there are {count})")
-    return [number - 1 for number in wanted]
+    if strange := [number for number in wanted if number not in numbers]:
+        raise ValueError(f"--frames: there is no drawing {format_frames(strange)} (there are {format_frames(numbers)})")
+    return [numbers.index(number) for number in wanted]
 
 
 def _read(clips: Path, index: bool) -> ClipFolder:
@@ -98,19 +109,16 @@ def _read(clips: Path, index: bool) -> ClipFolder:
         )
 
 
-def _search(drawing: Drawing, chosen: list[int], folder: ClipFolder, frame_rate: float | None, top: int) -> Matches:
-    import numpy as np
-
+def _search(drawing: Drawing, chosen: list[int], folder: ClipFolder, timing: Timing, top: int) -> Matches:
     from pegbar.align.match import match_clips
 
-    holds = np.array(drawing.holds or [1] * len(drawing.markers), float)
     return match_clips(
         drawing.markers[chosen],
         drawing.names,
         folder.clips,
         visible=drawing.visible[chosen],
-        frame_rate=frame_rate or drawing.frame_rate,
-        holds=holds[chosen],
+        frame_rate=timing.rate,
+        holds=timing.holds[chosen],
         loops=drawing.loops and len(chosen) == len(drawing.markers),
         top=top,
     )
@@ -135,28 +143,28 @@ def _write_sheet(output: Path, drawing: Drawing, chosen: list[int], folder: Clip
     rows = []
     for rank, match in enumerate(found.matches[:_ROWS], 1):
         points = match.camera.project(match.markers(clips[match.clip])[keys])
-        captions = tuple(f"frame {match.times[key]:.1f}" for key in keys)
+        captions = tuple(f"clip frame {match.times[key]:.1f}" for key in keys)
         rows.append(SheetRow(describe_match(rank, match, clips[match.clip]), points, captions))
-    titles = [f"drawing {number + 1}" for number in shown]
-    sheet = match_sheet(marks, titles, [_picture(drawing, number) for number in shown], rows)
+    titles = [f"drawing {_numbers(drawing)[place]}" for place in shown]
+    sheet = match_sheet(marks, titles, [_picture(drawing, place) for place in shown], rows)
     output.mkdir(parents=True, exist_ok=True)
     write_image(output / "match.png", sheet)
     print(f"match: wrote {output / 'match.png'}")
 
 
-def _picture(drawing: Drawing, number: int) -> NDArray[np.uint8] | None:
+def _picture(drawing: Drawing, place: int) -> NDArray[np.uint8] | None:
     """The drawing's picture where there is one to be read; the sheet does without."""
     from pegbar.io.frames import read_picture
 
     try:
-        return read_picture(drawing.images[number]) if drawing.images else None
+        return read_picture(drawing.images[place]) if drawing.images else None
     except (OSError, ValueError) as error:
         print(f"pegbar: warning: {describe(error)}", file=sys.stderr)
         return None
 
 
-def _write_choice(shot: Path | None, clips: Path, found: Matches) -> None:
-    """Put the best match into the shot file, or print what to put there."""
+def _write_choice(shot: Path | None, clips: Path, found: Matches, timing: Timing) -> None:
+    """Put the best match, and the frame rate it was found with, into the shot file, or print what to put there."""
     from pegbar.shot.clip import clip_text, write_clip
 
     if not found.found:
@@ -173,8 +181,11 @@ def _write_choice(shot: Path | None, clips: Path, found: Matches) -> None:
         "mirrored": best.mirrored,
         "swapped": best.swapped,
     }
+    # The clip's frames belong to this rate: another one would make aligning look for other frames.
+    rate = timing.rate or best.drawing_rate
     if shot is None:
-        print(f"\nFor the shot file:\n\n{clip_text(section)}", end="")
+        open_rate = f"[shot]\nframe_rate = {rate:g}\n\n" if timing.rate is None else ""
+        print(f"\nFor the shot file:\n\n{open_rate}{clip_text(section)}", end="")
         return
-    write_clip(shot, section)
-    print(f"match: wrote [clip] to {shot}")
+    write_clip(shot, section, frame_rate=None if rate == timing.said else rate)
+    print(f"match: wrote [clip]{'' if rate == timing.said else f' and frame_rate = {rate:g}'} to {shot}")

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from pegbar.cli.batch import progress
 from pegbar.errors import describe
 from pegbar.io.numbers import format_frames, parse_frames
 
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
     from pegbar.scene.motion import Motion
 
 _COLUMNS = ("clip", "frames", "rate", "seconds", "height", "unit", "up", "T-pose", "floor", "faces", "way", "joints")
+# A note on more clips than this stands once, with so many of their names.
+_FEW = 3
 
 
 @Parameter(name="*")
@@ -61,23 +65,19 @@ def info(
     Parameters
     ----------
     files
-        BVH, AMC or C3D files.
+        BVH, AMC or C3D files, or folders of such, with the folders below.
     """
+    names = dict(_named(files))
     if joints is not None and len(files) != 1:
         raise ValueError(f"--joints: want one clip, got {len(files)}")
-    options = options or ClipOptions()
-    read: list[tuple[Path, Motion, ClipReport]] = []
-    errors: dict[Path, str] = {}
-    for path in files:
-        try:
-            read.append((path, *options.read(path)))
-        except (OSError, ValueError) as error:
-            errors[path] = describe(error)
+    if joints is not None and files[0].is_dir():
+        raise ValueError(f"--joints: want one clip, got the folder {files[0]}")
+    read, errors = _read(names, options or ClipOptions())
     if as_json:
         failed = [{"file": str(path), "error": problem} for path, problem in errors.items()]
         print(json.dumps([_facts(*clip) for clip in read] + failed, indent=2))
     elif read:
-        _print_table(read)
+        _print_table(read, names)
     for problem in errors.values():
         print(f"pegbar: {problem}", file=sys.stderr)
     if joints is not None and read:
@@ -87,6 +87,33 @@ def info(
         write_joint_map(joints, motion.joint_map, derived=motion.derived)
         print(f"motion info: wrote {joints}", file=sys.stderr)
     return 1 if errors else 0
+
+
+def _named(files: list[Path]) -> Iterator[tuple[Path, str]]:
+    """The clips that are given or in given folders, and what to call each: in folders by their paths there."""
+    from pegbar.io.clip_folder import clip_files
+
+    for path in files:
+        if path.is_dir():
+            yield from ((found, found.relative_to(path).as_posix()) for found in clip_files(path))
+        else:
+            yield path, path.name
+
+
+def _read(
+    paths: Collection[Path], options: ClipOptions
+) -> tuple[list[tuple[Path, Motion, ClipReport]], dict[Path, str]]:
+    """The clips that can be read, and of the others why they cannot."""
+    read: list[tuple[Path, Motion, ClipReport]] = []
+    errors: dict[Path, str] = {}
+    with progress("read clips", len(paths)) as advance:
+        for path in paths:
+            try:
+                read.append((path, *options.read(path)))
+            except (OSError, ValueError) as error:
+                errors[path] = describe(error)
+            advance()
+    return read, errors
 
 
 def plot(
@@ -118,7 +145,7 @@ def plot(
     return 0
 
 
-def _print_table(clips: list[tuple[Path, Motion, ClipReport]]) -> None:
+def _print_table(clips: list[tuple[Path, Motion, ClipReport]], names: Mapping[Path, str]) -> None:
     from rich.console import Console
     from rich.table import Table
 
@@ -126,17 +153,24 @@ def _print_table(clips: list[tuple[Path, Motion, ClipReport]]) -> None:
     for column in (1, 2, 3, 4, 7, 8):
         table.columns[column].justify = "right"
     for clip in clips:
-        table.add_row(*_row(*clip))
+        table.add_row(names[clip[0]], *_row(clip[1], clip[2]))
     console = Console(soft_wrap=not sys.stdout.isatty(), highlight=False, markup=False)
     # Into a file or a pipe every clip has one line, however long.
     console.width = console.width if sys.stdout.isatty() else max(console.width, 400)
     console.print(table)
+    notes: dict[str, list[str]] = {}
     for path, _, report in clips:
         for note in report.notes:
-            console.print(f"{path.name}: {note}")
+            notes.setdefault(note, []).append(names[path])
+    for note, whose in notes.items():
+        # What holds for a whole collection is said once.
+        if len(whose) > _FEW:
+            whose = [f"{len(whose)} clips ({', '.join(whose[:_FEW])}, ...)"]
+        for name in whose:
+            console.print(f"{name}: {note}")
 
 
-def _row(path: Path, motion: Motion, report: ClipReport) -> tuple[str, ...]:
+def _row(motion: Motion, report: ClipReport) -> tuple[str, ...]:
     from pegbar.scene.body import MARKERS
 
     count = len(motion.positions)
@@ -144,7 +178,6 @@ def _row(path: Path, motion: Motion, report: ClipReport) -> tuple[str, ...]:
     faces = "-" if report.facing is None else " to ".join(dict.fromkeys(str(round(angle)) for angle in report.facing))
     found = len(MARKERS) - len(report.missing)
     return (
-        path.name,
         str(count),
         f"{motion.frame_rate:.4g}" + ("?" if report.rate_from == "assumed" else ""),
         f"{count / motion.frame_rate:.2f}",

@@ -12,6 +12,7 @@ from cyclopts import Parameter
 
 def report(
     shot: Path,
+    /,
     *,
     output: Annotated[
         Path | None, Parameter(name=("--output", "-o"), help="The page (default: report.html beside the shot file).")

@@ -25,6 +25,7 @@ _Program = Literal["pegbar", "blender"]
 
 def secondary(
     shot: Path,
+    /,
     options: BatchOptions | None = None,
     *,
     engine: Annotated[_Program | None, Parameter(help="What simulates (default: the shot file's).")] = None,
@@ -52,10 +53,8 @@ def _run(stage: SecondaryStage, options: BatchOptions) -> int:
     with bars() as tell:
         stage.progress = tell
         drivings = stage.drive()
-        for note in dict.fromkeys(stage.notes):
-            print(f"pegbar: note: {note}", file=sys.stderr)
-        for warning in dict.fromkeys(stage.warnings):
-            print(f"pegbar: warning: {warning}", file=sys.stderr)
+        for line in stage.remarks.lines(stage.path):
+            print(f"pegbar: {line}", file=sys.stderr)
         print(f"volumes: {_made(stage, 'volumes')}, in {os.path.relpath(stage.secondary.folder)}")
         try:
             scene = stage.simulate(drivings)

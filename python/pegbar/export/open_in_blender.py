@@ -1,4 +1,4 @@
-"""Opens an exported shot in Blender (4.2 and later): camera, markers, limbs, ground, frames, passes.
+"""Opens an exported shot in Blender (3.4 and later): camera, markers, limbs, ground, frames, passes.
 
 In Blender:     blender --python open_in_blender.py
 Or to render:   blender --background shot.blend --python open_in_blender.py -- --render
@@ -254,8 +254,9 @@ def _capsule() -> tuple[list[tuple[float, float, float]], list[tuple[int, ...]],
 def _passes(shot: dict[str, Any], pattern: str) -> None:
     """Multilayer EXR with colour, alpha and depth, and a layer to check them by."""
     scene = bpy.context.scene
-    scene.render.engine = "CYCLES"
-    scene.render.filepath, scene.render.film_transparent = pattern, True
+    # Without a denoiser, as some distributions build it, Blender refuses to render.
+    scene.cycles.use_denoising &= getattr(__import__("_cycles"), "with_openimagedenoise", True)
+    scene.render.engine, scene.render.filepath, scene.render.film_transparent = "CYCLES", pattern, True
     scene.render.use_compositing = scene.render.use_sequencer = scene.render.use_file_extension = False
     settings = scene.render.image_settings
     if hasattr(settings, "media_type"):

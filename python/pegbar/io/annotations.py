@@ -5,6 +5,7 @@ The format is described in docs/file-formats.md. Writing what was read gives the
 
 from __future__ import annotations
 
+import difflib
 import os
 from pathlib import Path
 from typing import Any
@@ -178,7 +179,9 @@ def _limbs(value: Any, names: tuple[str, ...]) -> tuple[Limb, ...]:
             raise Misplaced((*place, "name"), f"the limb {name!r} stands twice")
         for end in ("from", "to"):
             if limb[end] not in names:
-                raise Misplaced((*place, end), f"no marker is called {places.brief(limb[end])}")
+                near = difflib.get_close_matches(str(limb[end]), names, 1)
+                hint = f' (did you mean "{near[0]}"?)' if near else ""
+                raise Misplaced((*place, end), f"no marker is called {places.brief(limb[end])}{hint}")
         color = _color(limb.get("color"), (*place, "color"))
         for other in limbs:
             if color is not None and color == other.color:

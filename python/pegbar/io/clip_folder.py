@@ -76,12 +76,7 @@ def read_clips(
     ((), ['cut.bvh'])
     """
     root = Path(folder)
-    if not root.is_dir():
-        what = "a file, want a folder of clips" if root.exists() else "no such folder"
-        raise NotADirectoryError(f"{root}: {what}")
-    paths = sorted(_find(root))
-    if not paths:
-        raise FileNotFoundError(f"{root}: no {', '.join(KINDS)} file here or below")
+    paths = clip_files(root)
     place, known = load_index(root) if use_index else (None, {})
     kept: dict[str, Entry] = {}
     fresh = True
@@ -102,6 +97,17 @@ def read_clips(
         read=len(new),
         index=place,
     )
+
+
+def clip_files(folder: Path) -> list[Path]:
+    """Return the clips in ``folder`` and the folders below it, in order; raises as `read_clips` does."""
+    if not folder.is_dir():
+        what = "a file, want a folder of clips" if folder.exists() else "no such folder"
+        raise NotADirectoryError(f"{folder}: {what}")
+    paths = sorted(_find(folder))
+    if not paths:
+        raise FileNotFoundError(f"{folder}: no {', '.join(KINDS)} file here or below")
+    return paths
 
 
 def _find(root: Path) -> Iterator[Path]:

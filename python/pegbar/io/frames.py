@@ -36,6 +36,15 @@ _DTYPES: dict[str, tuple[str, ...]] = {
 _TO_RGB = {3: cv2.COLOR_BGR2RGB, 4: cv2.COLOR_BGRA2RGBA}
 
 
+def png_size(path: _Path) -> tuple[int, int] | None:
+    """Return width and height as the header of a PNG says, None for other files; OSError where it cannot be opened."""
+    with open(path, "rb") as file:
+        head = file.read(24)
+    if len(head) < 24 or not head.startswith(b"\x89PNG\r\n\x1a\n"):
+        return None
+    return int.from_bytes(head[16:20], "big"), int.from_bytes(head[20:24], "big")
+
+
 def read_image(path: _Path) -> Image:
     """Read a PNG, TIFF, JPEG or EXR file as it is stored.
 

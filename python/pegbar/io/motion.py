@@ -105,7 +105,7 @@ def read_motion(
     rate, rate_from = frame_rate or recording.frame_rate or ASSUMED_RATE, "given" if frame_rate else "the file"
     if not frame_rate and not recording.frame_rate:
         rate_from = "assumed"
-        notes.append(f"the file has no frame rate: {ASSUMED_RATE:g} assumed")
+        notes.append(f"it says no frame rate: {ASSUMED_RATE:g} frames a second assumed")
     height = None if clip.height is None else clip.height * unit_metres
     motion = clip.motion(unit_metres, axis, rate)
     report = ClipReport(unit_metres, unit_from, axis, axis_from, rate_from, height, notes=(*recording.notes, *notes))

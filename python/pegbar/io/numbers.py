@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
+from pathlib import Path
 
 #: A longer list of frames is a slip of the finger: eleven hours of film.
 MAX_FRAMES = 1_000_000
@@ -68,3 +70,17 @@ def format_frames(numbers: Iterable[int]) -> str:
         words.append(f"{first}" if first == last else f"{first}-{last}" + (f"x{step}" if step > 1 else ""))
         place = end
     return ", ".join(words)
+
+
+def file_numbers(paths: Sequence[Path]) -> list[int] | None:
+    """Return the numbers at the ends of the files' names; None where one has none, or they do not rise.
+
+    Examples
+    --------
+    >>> file_numbers([Path("walk.0007.png"), Path("walk.0009.png")])
+    [7, 9]
+    """
+    found = [re.search(r"(\d{1,9})$", path.stem) for path in paths]
+    numbers = [int(match[1]) for match in found if match]
+    rising = all(first < second for first, second in pairwise(numbers))
+    return numbers if numbers and len(numbers) == len(paths) and rising else None

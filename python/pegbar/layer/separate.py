@@ -25,6 +25,8 @@ Floats = NDArray[np.float64]
 STATIONS = np.linspace(0, 1, 9)
 # Rounds of moving pairs apart, and of smoothing what has moved; drawings that the smoothing reaches over.
 _ROUNDS, _SWEEPS, _REACH = 6, 8, 1.2
+# Drawings that are compared at once: all places of all pairs of limbs take 0.4 MB a drawing.
+_TOGETHER = 64
 # How much more easily a marker moves than the trunk, which everything hangs on.
 _LIGHT = 10.0
 _TRUNK = frozenset({"pelvis", "chest", "neck", "left_hip", "right_hip", "left_shoulder", "right_shoulder"})
@@ -145,8 +147,16 @@ class _Body:
 
     def overlaps(self, depths: Floats) -> tuple[Floats, tuple[Floats, ...]]:
         """How deep each pair overlaps or lacks clearance (F, P), and where: stations, depth between, depth needed."""
-        points = self.centres[:, None] + depths[..., None] * self.rays
-        volumes = collision_volumes(self.boxes, self.matrices, points, self.limbs)
+        starts = range(0, max(len(depths), 1), _TOGETHER)
+        parts = [self._overlaps(depths, slice(start, start + _TOGETHER)) for start in starts]
+        deepest, *where = (np.concatenate(values) for values in zip(*parts, strict=True))
+        return deepest, tuple(where)
+
+    def _overlaps(self, depths: Floats, part: slice) -> tuple[Floats, ...]:
+        """The five arrays of `overlaps` for the drawings of ``part``."""
+        matrices = self.matrices[part]
+        points = self.centres[part, None] + depths[part, :, None] * self.rays[part]
+        volumes = collision_volumes(self.boxes[part], matrices, points, self.limbs)
         axis = volumes.start[:, :, None] + STATIONS[:, None] * (volumes.end - volumes.start)[:, :, None]
         radii = volumes.start_radius[..., None] + STATIONS * (volumes.end_radius - volumes.start_radius)[..., None]
         apart = axis[:, self.second, None, :] - axis[:, self.first, :, None]
@@ -155,12 +165,12 @@ class _Body:
         shape = (*gaps.shape[:2], -1)
         deepest = np.where(np.isnan(gaps), -np.inf, gaps).reshape(shape).argmax(axis=2)[..., None]
         at = [np.take_along_axis(value.reshape(shape), deepest, axis=2)[..., 0] for value in (gaps, wide)]
-        between = np.einsum("fi,fpsti->fpst", self.matrices[:, 2, :3], apart)
+        between = np.einsum("fi,fpsti->fpst", matrices[:, 2, :3], apart)
         deep = np.take_along_axis(between.reshape(shape), deepest, axis=2)[..., 0]
         lateral = np.maximum((at[1] - at[0]) ** 2 - deep**2, 0)
         needed = np.sqrt(np.maximum(at[1] ** 2 - lateral, 0))
         along = np.divmod(deepest[..., 0], len(STATIONS))
-        return at[0], (STATIONS[along[0]], STATIONS[along[1]], deep, needed)
+        return at[0], STATIONS[along[0]], STATIONS[along[1]], deep, needed
 
     def order(self, depths: Floats, overlaps: Floats) -> Floats:
         """Which limb of each pair is behind (F, P): 1 the second, -1 the first; the same while they touch."""

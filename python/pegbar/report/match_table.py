@@ -25,8 +25,11 @@ def describe_match(rank: int, match: Match, clip: Clip) -> tuple[str, ...]:
     )
 
 
-def report_matches(folder: ClipFolder, found: Matches, drawings: Sequence[int]) -> None:
-    """Print the matches, the best first, and what to say of the best; ``drawings`` are the drawings' numbers."""
+def report_matches(folder: ClipFolder, found: Matches, timing: str, drawings: Sequence[int]) -> None:
+    """Print the matches, the best first, and what to say of the best.
+
+    ``timing`` says which frame rate they were found with, ``drawings`` are the drawings' numbers.
+    """
     from rich.console import Console
     from rich.table import Table
 
@@ -53,7 +56,7 @@ def report_matches(folder: ClipFolder, found: Matches, drawings: Sequence[int]) 
         table.add_row(str(rank), match.clip, _span(match), seconds, *view, f"{match.cost:.1f}", verdict)
     console = Console(highlight=False) if sys.stdout.isatty() else Console(highlight=False, width=160)
     console.print(table)
-    console.print("\n" + _summary(found, drawings), soft_wrap=True)
+    console.print(f"\n{_summary(found, drawings)}\n{timing}".rstrip(), soft_wrap=True)
 
 
 def report_left_out(broken: Mapping[str, str], skipped: Mapping[str, str]) -> None:

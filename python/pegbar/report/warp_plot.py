@@ -14,10 +14,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-# Rows and columns of costs that are drawn at most.
-_FINEST = 1000
-
-
 def warp_picture(
     cost: ArrayLike,
     warp: TimeWarp,
@@ -26,6 +22,7 @@ def warp_picture(
     clip_offset: float = 0,
     clip_step: float = 1,
     title: str = "",
+    thinned: tuple[int, int] = (1, 1),
 ) -> NDArray[np.uint8]:
     """Draw a time warp.
 
@@ -36,7 +33,7 @@ def warp_picture(
     Parameters
     ----------
     cost : (F, G) float
-        What was warped.
+        What was warped, F and G ``thinned``.
     warp : TimeWarp
         The result.
     size : (width, height)
@@ -45,6 +42,9 @@ def warp_picture(
         The clip's own frame of column j is clip_offset + clip_step * j, where the warp was made on a part of it.
     title : str
         Stands on top.
+    thinned : (rows, columns)
+        ``cost`` has every so manieth drawn and clip frame only, as of a long shot: more than the picture has pixels
+        would only take time and memory.
 
     Returns
     -------
@@ -54,30 +54,35 @@ def warp_picture(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    table = arrays.floats("cost", cost, (len(warp.times), "G"))
+    rows, columns = arrays.integers("thinned", thinned, (2,), low=1).tolist()
+    table = arrays.floats("cost", cost, (-(-len(warp.times) // rows), "G"))
     width, height = arrays.integers("size", size, (2,), low=100, high=10000).tolist()
     figure = Figure(figsize=(width / 100, height / 100), dpi=100, layout="constrained")
     canvas = FigureCanvasAgg(figure)
-    _draw(figure, table, warp, (clip_offset, clip_step), title)
+    _draw(figure, table, warp, (clip_offset, clip_step), (rows, columns), title)
     canvas.draw()  # type: ignore[no-untyped-call]
     return np.array(canvas.buffer_rgba(), np.uint8)  # type: ignore[no-untyped-call]
 
 
-def _draw(figure: Figure, table: NDArray[np.float64], warp: TimeWarp, clip: tuple[float, float], title: str) -> None:
+def _draw(
+    figure: Figure,
+    table: NDArray[np.float64],
+    warp: TimeWarp,
+    clip: tuple[float, float],
+    thinned: tuple[int, int],
+    title: str,
+) -> None:
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
     offset, step = clip
-    drawn = np.arange(len(table))
-    low, high = offset - step / 2, offset + step * (table.shape[1] - 0.5)
-    # Of a long shot's costs more than the picture has pixels would only take memory.
-    thin = tuple(slice(None, None, -(-count // _FINEST)) for count in table.shape)
-    shown = above.imshow(
-        table[thin].T, origin="lower", aspect="auto", cmap="gray", extent=(-0.5, len(table) - 0.5, low, high)
-    )
+    drawn, (wide, high) = np.arange(len(warp.times)), thinned
+    bottom, top = offset - step / 2, offset + step * (high * table.shape[1] - 0.5)
+    extent = (-0.5, wide * len(table) - 0.5, bottom, top)
+    shown = above.imshow(table.T, origin="lower", aspect="auto", cmap="gray", extent=extent)
     figure.colorbar(shown, ax=above, label="cost of a pair")
     above.plot(warp.path[:, 0], offset + step * warp.path[:, 1], color="tab:blue", label="path")
     above.plot(drawn, offset + step * warp.frames, ".", color="tab:orange", label="frames")
     above.plot(drawn, offset + step * warp.times, color="tab:red", label="times")
-    above.set(ylabel="clip frame", title=title, ylim=(low, high))
+    above.set(ylabel="clip frame", title=title, xlim=(-0.5, len(drawn) - 0.5), ylim=(bottom, top))
     above.legend(loc="upper left")
     for times, color in ((warp.frames, "tab:orange"), (warp.times, "tab:red")):
         below.step(drawn[:-1], step * np.diff(times), where="post", color=color)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import difflib
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +16,8 @@ from pegbar.scene.topology import body_by_shape
 _SIDES = ("left", "right")
 #: Markers that a drawing need not have, found where a skeleton has them.
 EXTRA = tuple(f"{side}_{joint}" for side in _SIDES for joint in ("collar", "wrist", "toe"))
+# How like a marker's name a misspelt one is: two exchanged letters of nine, and not `left_hand_tip`.
+_ALIKE = 0.85
 
 
 def map_joints(
@@ -160,3 +163,17 @@ def _votes(found: Mapping[str, int], shape: Mapping[str, int], parents: Sequence
     tops = {shape.get(f"{other}_hip", -1), shape.get(f"{other}_shoulder", -1)} - {-1}
     named = [joint for marker, joint in found.items() if marker.startswith(own)]
     return sum(bool(tops & set(_ancestors(joint, parents))) for joint in named)
+
+
+def misspelt_markers(names: Sequence[str], known: Iterable[str] = ()) -> dict[str, str]:
+    """Return those of ``names`` that seem to be misspelt markers, each with the marker that it is nearest to.
+
+    ``known`` are further names that are right, like a clip's own joints; markers that are named already are not meant.
+    """
+    right = {*MARKERS, *EXTRA, *known}
+    free = [marker for marker in MARKERS if marker not in names]
+    found = {}
+    for name in names:
+        if name not in right and (near := difflib.get_close_matches(name.lower(), free, 1, _ALIKE)):
+            found[name] = near[0]
+    return found

@@ -27,12 +27,15 @@ from pegbar.report.contact_sheet import contact_sheet, over_paper
 from pegbar.report.warp_plot import warp_picture
 from pegbar.scene.alignment import Alignment
 from pegbar.scene.drawing import Drawing
+from pegbar.scene.joints import misspelt_markers
 from pegbar.shot.alignment import AlignOptions, align_drawing
 from pegbar.shot.clip_choice import Choice, choose_clip
+from pegbar.shot.drawn import check_drawing, check_drawings
 from pegbar.shot.marks import ALIGNED, outside_warnings
 from pegbar.shot.plan import Shot
 from pegbar.shot.record import fingerprint, forget, is_up_to_date, write_record
-from pegbar.shot.registered import CameraOptions, Retiming
+from pegbar.shot.registered import CameraOptions
+from pegbar.shot.retiming import Retiming
 
 VERSION = 5
 _SHEET = 24
@@ -80,6 +83,7 @@ class AlignStage:
         if self.is_done():
             return read_alignment(self.outputs()[0]), False
         self._check_marks(drawing)
+        check_drawings(self.shot, self.numbers)
         with hold(self.folder):
             return self._align(drawing, holds, progress), True
 
@@ -90,6 +94,7 @@ class AlignStage:
         # What is changed while this works is out of date afterwards.
         prints = [fingerprint(path) for path in self._inputs() if path.is_file()]
         choice = self._choice(drawing, holds, rate)
+        self._check_names(drawing, (*choice.motion.known_markers, *choice.motion.names))
         alignment, retiming = align_drawing(drawing, choice.motion, choice.view, holds, rate, self._options())
         alignment = dataclasses.replace(
             alignment,
@@ -158,6 +163,14 @@ class AlignStage:
                 name = self.shot.settings.drawing.annotations
                 raise DegenerateError(f"{name}: drawing {number}: too few visible marks ({joints}), want 4 or more")
 
+    def _check_names(self, drawing: Drawing, known: tuple[str, ...]) -> None:
+        """Refuse misspelt markers, which would be left out; ``known`` are the clip's."""
+        if wrong := misspelt_markers(drawing.names, known):
+            name = self.shot.settings.drawing.annotations
+            raise ShotError(
+                [f"{name}: no marker is called {word!r} (did you mean {near!r}?)" for word, near in wrong.items()]
+            )
+
     def _choice(self, drawing: Drawing, holds: NDArray[np.float64], rate: float) -> Choice:
         """The shot's clip; ShotError, with its place in the shot file, for files that cannot be read."""
         section = self.shot.settings.clip
@@ -167,6 +180,10 @@ class AlignStage:
         except (FormatError, OSError) as error:
             key = "clip.path" if section.path is not None else "clip.folder"
             raise ShotError([f"{self.shot.place(key)}: {key}: {describe(error)}"]) from error
+        except ValueError:
+            # Too few joints to compare may be for their names.
+            self._check_names(drawing, ())
+            raise
 
     def _outside(self) -> list[str]:
         marks = self.shot.annotations
@@ -222,16 +239,22 @@ class AlignStage:
         atomic.write_bytes(errors, _error_table(self.numbers, alignment).encode())
         step = float(np.mean(np.diff(retiming.moments))) if len(retiming.moments) > 1 else 1.0
         offset = float(retiming.moments[0])
-        write_image(
-            warp,
-            warp_picture(retiming.cost, retiming.warp, clip_offset=offset, clip_step=step, title=choice.path.name),
+        plot = warp_picture(
+            retiming.cost,
+            retiming.warp,
+            clip_offset=offset,
+            clip_step=step,
+            title=choice.path.name,
+            thinned=retiming.thinned,
         )
+        write_image(warp, plot)
         # Of a long shot only the sheet's pictures are kept.
         chosen = set(np.linspace(0, len(overlays) - 1, min(_SHEET, len(overlays))).round().astype(int).tolist())
         pictures = []
         for frame, (number, path) in enumerate(zip(self.numbers, overlays, strict=True)):
             label = f"drawing {number}  clip frame {alignment.times[frame]:.1f}  {alignment.errors[frame]:.1f} px"
             picture = read_picture(self.shot.drawings.path(number))
+            check_drawing(self.shot, number, picture)
             overlay = align_overlay(picture, alignment, frame, label)
             write_image(path, overlay)
             if frame in chosen:

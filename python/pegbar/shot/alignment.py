@@ -16,7 +16,8 @@ from pegbar.scene.contacts import FEET, ankle_heights, foot_contacts
 from pegbar.scene.drawing import Drawing
 from pegbar.scene.mirror import exchanged, mirrored
 from pegbar.scene.motion import Motion
-from pegbar.shot.registered import CameraOptions, Marks, Retiming, View, register_clip
+from pegbar.shot.registered import CameraOptions, View, register_clip
+from pegbar.shot.retiming import Marks, Retiming
 
 Floats = NDArray[np.float64]
 # Marks that are farther from the clip than this share of the figure's height are told to the user.

@@ -34,7 +34,10 @@ def film_cameras(driving: Driving, rows: NDArray[np.int64]) -> tuple[Perspective
     known = np.flatnonzero(rows >= 0)
     if not len(known):
         raise ValueError("no frame of the shot shows a drawing with marks")
-    nearest = known[np.argmin(np.abs(np.arange(len(rows))[:, None] - known), axis=1)]
+    places = np.arange(len(rows))
+    behind = np.searchsorted(known, places).clip(max=len(known) - 1)
+    before, after = known[np.maximum(behind - 1, 0)], known[behind]
+    nearest = np.where(np.abs(places - before) <= np.abs(after - places), before, after)
     return tuple(PerspectiveCamera(driving.matrices[rows[place]], driving.image_size) for place in nearest)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from pegbar.errors import describe
 from pegbar.io.alignment import read_alignment
+from pegbar.scene.joints import misspelt_markers
 from pegbar.shot.align_stage import AlignStage
 from pegbar.shot.clip_choice import check_part, read_clip
 from pegbar.shot.dots_stage import DotsStage
@@ -108,8 +109,10 @@ def _marks(shot: Shot) -> Iterator[Problem]:
 def _clip(shot: Shot) -> Iterator[Problem]:
     section = shot.settings.clip
     if section is None:
+        yield from _misspelt(shot, ())
         return
     if section.path is None:
+        yield from _misspelt(shot, ())
         assert section.folder is not None
         folder = shot.folder / section.folder
         if not folder.is_dir():
@@ -127,12 +130,22 @@ def _clip(shot: Shot) -> Iterator[Problem]:
     if shot.annotations is None:
         return
     there = {*motion.known_markers, *motion.names}
-    lost = [name for name in shot.annotations.names if name not in there]
+    yield from _misspelt(shot, there)
+    wrong = misspelt_markers(shot.annotations.names, there)
+    lost = [name for name in shot.annotations.names if name not in (*there, *wrong)]
     how = "map them with clip.joints (pegbar motion info shows the clip's joints)"
-    if len(shot.annotations.names) - len(lost) < 4:
+    if len(shot.annotations.names) - len(lost) - len(wrong) < 4:
         yield _at(shot, "clip.path", f"{section.path} has fewer than four of the drawing's joints", how)
     elif lost:
         yield _at(shot, "clip.path", f"{section.path} has no joint for {', '.join(lost)}", how)
+
+
+def _misspelt(shot: Shot, known: Iterable[str]) -> Iterator[Problem]:
+    """Names in the annotations that are neither markers nor ``known``, and nearly markers."""
+    marks = shot.annotations
+    for name, near in misspelt_markers(() if marks is None else marks.names, known).items():
+        what = f"{shot.settings.drawing.annotations}: no marker is called {name!r} (did you mean {near!r}?)"
+        yield _at(shot, "drawing.annotations", what, "correct the name there, in markers and in limbs")
 
 
 def _camera(shot: Shot) -> Iterator[Problem]:

@@ -21,8 +21,8 @@ def clip_text(section: Mapping[str, Any]) -> str:
     return "\n".join(["[clip]", *(f"{key} = {value}" for key, value in _values(section).items()), ""])
 
 
-def write_clip(path: Path, section: Mapping[str, Any]) -> None:
-    """Put ``section`` into the shot file at ``path``, in place of the one that is there.
+def write_clip(path: Path, section: Mapping[str, Any], *, frame_rate: float | None = None) -> None:
+    """Put ``section`` into the shot file at ``path``, in place of the one that is there, and the shot's frame rate.
 
     Raises
     ------
@@ -35,6 +35,8 @@ def write_clip(path: Path, section: Mapping[str, Any]) -> None:
     load_shot(path)
     text = path.read_bytes().decode("utf-8-sig")
     changed = replace_clip(text, section)
+    if frame_rate is not None:
+        changed = replace_frame_rate(changed, frame_rate)
     try:
         table = tomllib.loads(changed)
     except tomllib.TOMLDecodeError:
@@ -64,6 +66,25 @@ def replace_clip(text: str, section: Mapping[str, Any]) -> str:
     body += [f"{key} = {value}" for key, value in values.items()]
     rest = ["", *lines[end:]] if end < len(lines) else []
     return "\n".join([*lines[: begin + 1], *body, *rest]) + "\n"
+
+
+def replace_frame_rate(text: str, rate: float) -> str:
+    """Return the TOML ``text`` with ``rate`` as the shot's: in the line that says it, or would without its ``#``."""
+    lines = text.splitlines()
+    headers = [(number, found[1]) for number, line in enumerate(lines) if (found := _HEADER.match(line))]
+    begin = next((number for number, name in headers if name == "shot"), None)
+    value = f"{rate:g}"
+    if begin is None:
+        return f"[shot]\nframe_rate = {value}\n\n{text}"
+    end = next((number for number, _ in headers if number > begin), len(lines))
+    for mark in ("", r"#\s*"):
+        for number in range(begin + 1, end):
+            if found := re.match(rf"\s*{mark}frame_rate\s*=\s*[^\s#]+(\s*#.*)?$", lines[number]):
+                # What a line that was no setting says beside it is not true any more.
+                lines[number] = f"frame_rate = {value}{(found[1] or '') if not mark else ''}"
+                return "\n".join(lines) + "\n"
+    lines.insert(begin + 1, f"frame_rate = {value}")
+    return "\n".join(lines) + "\n"
 
 
 def _renewed(line: str, values: dict[str, str], kept: set[str]) -> str | None:

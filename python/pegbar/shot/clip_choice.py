@@ -68,7 +68,7 @@ def choose_clip(
             view = _view(_best(found, path.name), section.start)
         else:
             view = _given_view(section, motion, found)
-    notes += motion.report.notes if motion.report is not None else ()
+    notes += [f"{path.name}: {note}" for note in motion.report.notes] if motion.report is not None else []
     return Choice(path, motion, view, tuple(notes), tuple(_doubts(path.name, found)))
 
 

@@ -142,14 +142,27 @@ class DotsStage:
             # What a key drawing does not show is hidden there; between keys marks follow the nearest keys.
             visible=np.where(keyed[:, None], there, _near(there, keyed)) & np.isfinite(carried).all(axis=2),
             image_size=(width, height),
-            frame_rate=self.settings.shot.frame_rate,
+            frame_rate=self._rate(),
+            holds=self._holds(len(numbers)),
             images=tuple(files.path(number) for number in numbers),
             limbs=limbs,
             notes={"carried": f"drawings {format_frames(between)}"} if between else {},
         )
 
+    def _rate(self) -> float | None:
+        """Film frames a second; None where the shot file leaves them open, for the search to find."""
+        shot = self.settings.shot
+        return shot.frame_rate if "frame_rate" in shot.model_fields_set else None
+
+    def _holds(self, count: int) -> tuple[int, ...]:
+        """For how many film frames the drawings are held, where the shot file says it with a number."""
+        hold = self.settings.drawing.hold
+        if isinstance(hold, list):
+            return tuple(hold) if len(hold) == count else ()
+        return (hold,) * count if isinstance(hold, int) and hold > 1 else ()
+
     def _recipe(self, joints: dict[str, str]) -> str:
-        parts: list[Any] = [VERSION, self._section().model_dump(), joints, self.settings.shot.frame_rate]
+        parts: list[Any] = [VERSION, self._section().model_dump(), joints, self._rate(), self.settings.drawing.hold]
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,9 +10,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pegbar.errors import DegenerateError
+from pegbar.errors import DegenerateError, ShotError
 from pegbar.io.exr import read_passes
-from pegbar.io.frames import read_picture
+from pegbar.io.frames import png_size, read_picture
 from pegbar.layer.depth import limb_depth
 from pegbar.layer.matte import ink_alpha, matte
 from pegbar.layer.segmentation import grow_labels, palette_labels, segment_stick_figure
@@ -172,3 +173,32 @@ def check_size(frame: int, path: Path, image: NDArray[np.generic], size: tuple[i
     height, width = image.shape[:2]
     if size is not None and (width, height) != tuple(size):
         raise ValueError(f"frame {frame}: {path}: want {size[0]} x {size[1]} pixels, got {width} x {height}")
+
+
+def check_drawings(shot: Shot, numbers: Iterable[int]) -> None:
+    """Raise ShotError, naming all of them, for drawings of another size than the shot or its marks have.
+
+    Only headers of PNG files are read; other pictures are checked when they are read, by `check_drawing`.
+    """
+    problems = []
+    for number in numbers:
+        path = shot.drawings.path(number)
+        size = png_size(path) if path.is_file() else None
+        problems += [] if size is None else _odd_size(shot, path, size)
+    if problems:
+        raise ShotError(problems)
+
+
+def check_drawing(shot: Shot, number: int, picture: NDArray[np.uint8]) -> None:
+    """Raise ShotError where the ``picture`` of drawing ``number`` has another size than the shot or its marks have."""
+    if problems := _odd_size(shot, shot.drawings.path(number), _size(picture)):
+        raise ShotError(problems)
+
+
+def _odd_size(shot: Shot, path: Path, size: tuple[int, int]) -> list[str]:
+    marks, given = shot.annotations, shot.settings.shot.size
+    wanted = given or (marks.image_size if marks is not None else size)
+    if tuple(wanted) == size:
+        return []
+    source = "shot.size" if given else "as the joint marks say"
+    return [f"{path}: want {wanted[0]} x {wanted[1]} pixels ({source}), got {size[0]} x {size[1]}"]

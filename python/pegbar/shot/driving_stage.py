@@ -31,7 +31,7 @@ from pegbar.scene.drawing import Drawing
 from pegbar.scene.driving import Driving
 from pegbar.scene.volumes import TaperedCylinders
 from pegbar.shot.align_stage import AlignStage
-from pegbar.shot.drawn import read_labels
+from pegbar.shot.drawn import check_drawing, read_labels
 from pegbar.shot.driving import drive
 from pegbar.shot.marks import ALIGNED, outside_warnings
 from pegbar.shot.model import SecondarySection
@@ -180,6 +180,7 @@ class DrivingStage:
         exposure = shot.exposure
         frame = next((frame for frame in exposure.frames if exposure.drawing(frame) == number), number)
         picture = read_picture(shot.drawings.path(number))
+        check_drawing(shot, number, picture)
         marks = shot.annotations
         ends = marks.markers[shot.marks[number]][marks.limb_markers]
         labels = read_labels(shot, frame, picture)[0] if shot.labels is not None else None

@@ -25,19 +25,18 @@ from pegbar.scene.driving import Driving
 from pegbar.shot.blender_stage import BlenderStage
 from pegbar.shot.dots_stage import DotsStage
 from pegbar.shot.find import plan_output
+from pegbar.shot.measured import measured
 from pegbar.shot.passes_stage import ElementsStage, Layers
+from pegbar.shot.remarks import Remarks
 from pegbar.shot.secondary import Secondary
 from pegbar.shot.simulation_stage import SimulationStage
 from pegbar.simulate.blender.engine import BlenderEngine
 from pegbar.simulate.cloth import ClothEngine
-from pegbar.simulate.elements import Cloth, Strands
-from pegbar.simulate.engine import Engine
-from pegbar.simulate.measures import ClothMeasures, measure_cloth, measure_particles, measure_strands
+from pegbar.simulate.engine import Engine, assign
 from pegbar.simulate.particles import ParticleEngine
 from pegbar.simulate.rapier import RapierEngine
 from pegbar.simulate.scene import SimulationScene
 from pegbar.simulate.strands import StrandEngine
-from pegbar.simulate.weather import Particles
 
 Progress = Callable[[str, int, int], None]
 _SHEET = 12
@@ -49,15 +48,14 @@ ENGINES = (RapierEngine(), ClothEngine(), StrandEngine(), ParticleEngine())
 class SecondaryStage:
     """Runs the stages of the shot file ``path``; ``engine`` and ``renderer`` go before the file's own.
 
-    ``times`` are seconds a stage, ``notes`` what was assumed, and ``warnings`` what looks wrong.
+    ``times`` are seconds a stage, ``remarks`` what was assumed and what looks wrong.
     """
 
     path: Path
     overwrite: bool = False
     progress: Progress | None = None
     times: dict[str, float] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)
+    remarks: Remarks = field(default_factory=Remarks)
     made: dict[str, bool] = field(default_factory=dict)
     engine: Literal["pegbar", "blender"] | None = field(default=None, kw_only=True)
     renderer: Literal["pegbar", "blender"] | None = field(default=None, kw_only=True)
@@ -74,35 +72,33 @@ class SecondaryStage:
         if dots.is_wanted:
             with self._timed("dots"):
                 remarks, self.made["dots"] = dots.run()
-                self.notes += remarks
+                self.remarks.add(remarks, made=self.made["dots"])
         alignments: list[tuple[Alignment | None, bool]] = []
         with self._timed("align"):
             alignments += [stage.align(self._told("align")) for stage in self.secondary.stages]
         with self._timed("volumes"):
             found = [stage.run(self._told("volumes")) for stage in self.secondary.stages]
         self.made |= {"align": any(made for _, made in alignments), "volumes": any(made for _, made in found)}
-        for alignment, _ in alignments:
-            self.notes += () if alignment is None else alignment.notes
-            self.warnings += () if alignment is None else alignment.warnings
-        for stage in self.secondary.stages:
-            self.warnings += stage.remarks()
-        drivings = [driving for driving, _ in found]
-        for driving in drivings:
-            self.warnings += driving.notes
-        return drivings
+        for alignment, made in alignments:
+            if alignment is not None:
+                self.remarks.add(alignment.notes, alignment.warnings, made=made)
+        for stage, (driving, made) in zip(self.secondary.stages, found, strict=True):
+            self.remarks.add(warnings=[*stage.remarks(), *driving.notes], made=made)
+        return [driving for driving, _ in found]
 
     @property
     def engines(self) -> tuple[Engine, ...]:
         """What simulates."""
         if self.secondary.section.engine == "pegbar":
             return ENGINES
-        return (BlenderEngine(self.secondary.blender), StrandEngine(), ParticleEngine())
+        return (BlenderEngine(self.secondary.blender), *ENGINES)
 
     def simulate(self, drivings: list[Driving]) -> SimulationScene:
         """Simulate what is out of date; return the scene. SimulationError where it explodes."""
         with self._timed("simulation"):
             scene = self.secondary.scene(drivings)
             self.made["simulation"] = SimulationStage(self.secondary, scene, self.engines).run(self.progress)
+            self.remarks.add(own_work(scene, self.engines), made=self.made["simulation"])
         return scene
 
     def frames(self, drivings: list[Driving], scene: SimulationScene) -> ElementsStage:
@@ -164,11 +160,11 @@ class SecondaryStage:
             "overlap_before_m": float(max(driving.overlaps[:, 0].max(initial=0) for driving in drivings)),
             "overlap_after_m": float(max(driving.overlaps[:, 1].max(initial=0) for driving in drivings)),
             "repaired_boxes": int(sum(driving.repaired.sum() for driving in drivings)),
-            **_measured(scene, DiskCache(self.secondary.folder / "cache"), self.secondary.frames[0]),
+            **measured(scene, DiskCache(self.secondary.folder / "cache"), self.secondary.frames[0]),
             "seconds": {name: round(value, 3) for name, value in self.times.items()},
             "made": self.made,
-            "notes": list(dict.fromkeys(self.notes)),
-            "warnings": list(dict.fromkeys(self.warnings)),
+            "notes": self.remarks.notes,
+            "warnings": self.remarks.warnings,
         }
 
     @contextmanager
@@ -184,63 +180,21 @@ class SecondaryStage:
         return None if tell is None else lambda done, total: tell(name, done, total)
 
 
+def own_work(scene: SimulationScene, engines: Sequence[Engine]) -> list[str]:
+    """Return a note of the elements that Blender, asked to simulate, leaves to our own engines."""
+    if not any(isinstance(engine, BlenderEngine) for engine in engines):
+        return []
+    left = [
+        element.name
+        for engine, share in assign(scene, engines)
+        if not isinstance(engine, BlenderEngine)
+        for element in share
+    ]
+    return [f"Blender cannot simulate {', '.join(left)}: pegbar's own engines do"] if left else []
+
+
 def _reprojection(driving: Driving) -> float:
     """How far in pixels the 3D markers are seen from the drawn marks, at most."""
     cameras = [PerspectiveCamera(matrix, driving.image_size) for matrix in driving.matrices]
     seen = np.stack([camera.project(points) for camera, points in zip(cameras, driving.positions, strict=True)])
     return float(np.nanmax(np.linalg.norm(seen - driving.markers, axis=2)))
-
-
-def _measured(scene: SimulationScene, cache: DiskCache, first: int) -> dict[str, Any]:
-    """Deepest penetration, with its film frame and limb, and stretch of all cloth and strands, and of all cloth."""
-    found: dict[str, dict[str, Any]] = {"cloth": {}, "strands": {}}
-    stretches = [np.empty(0)]
-    for element in scene.elements:
-        if isinstance(element, Cloth):
-            measures = measure_cloth(scene, cache, element.name)
-            stretches.append(measures.stretch.ravel())
-            found["cloth"][element.name] = {"vertices": len(element.vertices), **_worst(measures, first)}
-        elif isinstance(element, Strands):
-            measures = measure_strands(scene, cache, element.name)
-            size = {"strands": len(element.counts), "points": len(element.points)}
-            found["strands"][element.name] = size | _worst(measures, first)
-    found["particles"] = _measured_particles(scene, cache, first)
-    every = np.concatenate(stretches)
-    parts = [part for kind in found.values() for part in kind.values()]
-    return {
-        **found,
-        "deepest_penetration_m": max((part["deepest_penetration_m"] for part in parts), default=None),
-        "height_m": max((character.height for character in scene.characters), default=0.0),
-        "stretch_p99": float(np.percentile(every, 99)) if every.size else None,
-    }
-
-
-def _worst(measures: ClothMeasures, first: int) -> dict[str, Any]:
-    """The figures of one element; ``first`` is the film frame of the scene's first."""
-    worst = int(np.argmax(measures.penetration))
-    middle, most, largest = measures.percentiles
-    return {
-        "deepest_penetration_m": float(measures.penetration[worst]),
-        "in_frame": first + worst,
-        "in_limb": measures.limb[worst],
-        "stretch_median": middle,
-        "stretch_p99": most,
-        "stretch_max": largest,
-    }
-
-
-def _measured_particles(scene: SimulationScene, cache: DiskCache, first: int) -> dict[str, Any]:
-    """Of all particles their deepest penetration, with its film frame and limb, and how many there are on average."""
-    found: dict[str, Any] = {}
-    for element in scene.elements:
-        if isinstance(element, Particles):
-            measures = measure_particles(scene, cache, element.name)
-            worst = int(np.argmax(measures.penetration))
-            found[element.name] = {
-                "falling_mean": float(measures.falling.mean()),
-                "settled_mean": float(measures.settled.mean()),
-                "deepest_penetration_m": float(measures.penetration[worst]),
-                "in_frame": first + worst,
-                "in_limb": measures.limb[worst],
-            }
-    return found

@@ -7,11 +7,11 @@ from functools import cached_property
 from pathlib import Path
 
 from pegbar.export.shot_scene import ShotScene, filmed
-from pegbar.scene.alignment import Alignment
 from pegbar.shot.dots_stage import DotsStage
 from pegbar.shot.load import load_shot
 from pegbar.shot.model import SecondarySection
 from pegbar.shot.plan import Shot
+from pegbar.shot.remarks import Remarks
 from pegbar.shot.secondary import Secondary
 from pegbar.shot.secondary_stage import Progress
 
@@ -38,32 +38,33 @@ class Tracked(Secondary):
         return super().folder
 
 
-def shot_scene(tracked: Tracked, progress: Progress | None = None) -> tuple[ShotScene, list[str]]:
+def shot_scene(tracked: Tracked, progress: Progress | None = None) -> tuple[ShotScene, Remarks]:
     """Return the shot's cameras and characters for every film frame, and what was assumed or looks wrong.
 
     Reads dots, aligns, and finds limb boxes and volumes where that is out of date; raises what these stages raise.
     """
-    notes: list[str] = []
+    remarks = Remarks()
     dots = DotsStage(tracked.path, tracked.overwrite)
     if dots.is_wanted:
-        notes += dots.run()[0]
-    alignments: list[Alignment | None] = []
+        told, made = dots.run()
+        remarks.add(told, made=made)
     for stage in tracked.stages:
         tell = None if progress is None else lambda done, total: progress("align", done, total)
-        alignments.append(stage.align(tell)[0])
+        alignment, made = stage.align(tell)
+        if alignment is not None:
+            remarks.add(alignment.notes, alignment.warnings, made=made)
     drivings = []
     for stage in tracked.stages:
         tell = None if progress is None else lambda done, total: progress("volumes", done, total)
-        drivings.append(stage.run(tell)[0])
-    for alignment in alignments:
-        notes += () if alignment is None else (*alignment.notes, *alignment.warnings)
-    for driving in drivings:
-        notes += driving.notes
+        driving, made = stage.run(tell)
+        remarks.add(warnings=driving.notes, made=made)
+        drivings.append(driving)
     characters, scene = tracked.characters(drivings)
     shot, known = tracked.stages[0].bare, set(drivings[0].numbers)
     drawings = tuple(_drawing(shot, frame) for frame in tracked.frames)
     if lost := sum(number not in known for number in drawings):
-        notes.append(f"{lost} of {len(drawings)} frames show no drawing with marks: characters are hidden there")
+        told = (f"{lost} of {len(drawings)} frames show no drawing with marks: characters are hidden there",)
+        remarks.add(told, made=True)
     found = ShotScene(
         tracked.names[0],
         tracked.frames,
@@ -74,7 +75,7 @@ def shot_scene(tracked: Tracked, progress: Progress | None = None) -> tuple[Shot
         scene.ground,
         tuple(None if number is None else shot.drawings.path(number) for number in drawings),
     )
-    return found, list(dict.fromkeys(notes))
+    return found, remarks
 
 
 def film_scene(scene: ShotScene, tracked: Tracked) -> ShotScene:

@@ -118,7 +118,7 @@ def _text(
 [shot]
 name = {_quoted(folder.name)}
 frames = "{format_frames(drawings.numbers).replace(" ", "")}"
-frame_rate = 24
+{_rate(annotations)}
 size = [{width}, {height}]
 
 [drawing]
@@ -148,6 +148,14 @@ depth_picture = "{own}/depth.####.png"
 # [secondary]                # cloth and balls that collide with the drawing: pegbar secondary
 # elements = ["scarves", "skirt", "balls"]
 {_dots(found, folder)}"""
+
+
+def _rate(annotations: Path | None) -> str:
+    """The line of the frame rate: as the annotations say, or left open, for the search to find."""
+    rate = None if annotations is None else read_annotations(annotations).frame_rate
+    if rate is not None:
+        return f"frame_rate = {rate:g}"
+    return "# frame_rate = 24          # film frames a second; pegbar match --write finds it where it stands open"
 
 
 def _dots(found: dict[str, list[FrameSequence]], folder: Path) -> str:

@@ -22,6 +22,9 @@ class Colliders:
         self._volumes = Volumes(scene, [element for element in scene.elements if isinstance(element, Prop)])
         self._balls = [element for element in scene.elements if isinstance(element, Balls)]
         self._sheets = [element for element in scene.elements if isinstance(element, Cloth | Prop)]
+        # The last frame of what was simulated before. To list a long cache's files for every frame would take long.
+        there = {element.name: cache.frames(element.name) for element in (*self._balls, *self._sheets)}
+        self._last = {name: frames[-1] for name, frames in there.items() if frames}
         offsets = np.cumsum([0, *(len(sheet.vertices) for sheet in self._sheets)])
         parts = [sheet.triangles + offset for sheet, offset in zip(self._sheets, offsets, strict=False)]
         #: The triangles (T, 3) of all sheets, indices into ``vertices``.
@@ -55,8 +58,7 @@ class Colliders:
         return np.ascontiguousarray(np.concatenate(rows, axis=1))
 
     def _positions(self, name: str, frame: int, resting: Floats) -> Floats:
-        there = self._cache.frames(name)
-        if not there:
+        if name not in self._last:
             return resting
-        positions: Floats = np.asarray(self._cache.read(name, min(frame, there[-1]))["positions"], np.float64)
+        positions: Floats = np.asarray(self._cache.read(name, min(frame, self._last[name]))["positions"], np.float64)
         return positions

@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class ClothMeasures:
-    """What is measured on a cloth, or on strands, over F frames.
+    """What is measured on a cloth, or on strands, over F frames: all of the scene's, or those that were asked for.
 
     ``penetration`` (F,) is how deep its deepest free point lies in a volume, in metres, 0 where it is clear: of all
     vertices that no pin holds and the middles of their edges. ``limb`` (F,) names the volume ("" where it is clear).
@@ -44,8 +44,12 @@ class ClothMeasures:
         return middle, most, largest
 
 
-def measure_cloth(scene: SimulationScene, cache: Cache, name: str) -> ClothMeasures:
-    """Measure the cloth ``name`` of ``scene`` in all frames of ``cache``.
+def measure_cloth(
+    scene: SimulationScene, cache: Cache, name: str, *, frames: Sequence[int] | None = None
+) -> ClothMeasures:
+    """Measure the cloth ``name`` of ``scene`` in ``frames`` of ``cache``, or in all.
+
+    A thousand frames of a skirt with 6,000 edges take 50 MB.
 
     Raises ValueError for an element that is no cloth of the scene and KeyError for frames that are not in the cache.
 
@@ -64,11 +68,13 @@ def measure_cloth(scene: SimulationScene, cache: Cache, name: str) -> ClothMeasu
     edges = cloth_edges(cloth.triangles)
     rest = cloth.vertices if cloth.rest is None else cloth.rest
     lengths = np.maximum(np.linalg.norm(rest[edges[:, 0]] - rest[edges[:, 1]], axis=1), 1e-12)
-    return _measure(scene, cache, name, edges, lengths, _free(cloth.pins, len(rest)))
+    return _Measuring(scene, cache, name, edges, lengths, _free(cloth.pins, len(rest))).over(frames)
 
 
-def measure_strands(scene: SimulationScene, cache: Cache, name: str) -> ClothMeasures:
-    """Measure the strands ``name`` of ``scene`` in all frames of ``cache``: their points and the middles of links.
+def measure_strands(
+    scene: SimulationScene, cache: Cache, name: str, *, frames: Sequence[int] | None = None
+) -> ClothMeasures:
+    """Measure the strands ``name`` of ``scene`` in ``frames`` of ``cache``, or in all: points and middles of links.
 
     ``stretch`` (F, s) is that of every strand as a whole. Next to a pin that lies in a volume, as in a hand, strands
     lie in it too: only what is deeper than the pin and the way from it explain counts.
@@ -89,40 +95,47 @@ def measure_strands(scene: SimulationScene, cache: Cache, name: str) -> ClothMea
         raise ValueError(f"name: {name!r} is no strands of the scene")
     links = strands.links
     lengths, free = strands.link_lengths[links[:, 0]], _free(strands.pins, len(strands.points))
-    found = _measure(scene, cache, name, links, lengths, free, _to_pins(links, lengths, free))
+    found = _Measuring(scene, cache, name, links, lengths, free, _to_pins(links, lengths, free)).over(frames)
     starts = np.cumsum(strands.counts - 1) - (strands.counts - 1)
     grown = np.add.reduceat((1 + found.stretch) * lengths, starts, axis=1)
     return replace(found, stretch=grown / np.add.reduceat(lengths, starts) - 1)
 
 
-def _measure(
-    scene: SimulationScene,
-    cache: Cache,
-    name: str,
-    edges: NDArray[np.int64],
-    lengths: Floats,
-    free: NDArray[np.bool_],
-    way: tuple[NDArray[np.int64], Floats] | None = None,
-) -> ClothMeasures:
-    """Measure points with ``edges`` (E, 2) of ``lengths`` (E,) of which those of ``free`` (n,) are not pinned.
+@dataclass(frozen=True, eq=False)
+class _Measuring:
+    """Measures points with ``edges`` (E, 2) of ``lengths`` (E,) of which those of ``free`` (n,) are not pinned.
 
     ``way`` has by point its pin and the metres to it, where these excuse what lies in a volume.
     """
-    rows, names = _volumes(scene)
-    moving = edges[free[edges].any(axis=1)]
-    penetration, limb, stretch = np.zeros(scene.frames), [], np.empty((scene.frames, len(edges)))
-    for frame in range(scene.frames):
-        positions = np.asarray(cache.read(name, frame)["positions"], np.float64)
-        stretch[frame] = np.linalg.norm(positions[edges[:, 0]] - positions[edges[:, 1]], axis=1) / lengths - 1
-        points = np.concatenate([positions[free], positions[moving].mean(axis=1)])
-        excused: Floats | float = 0.0
-        if way is not None:
-            capsules = np.ascontiguousarray(rows[frame])
-            held = np.maximum(-_kernels.capsule_distances(positions[way[0]], capsules)[0] - way[1], 0)
-            excused = np.concatenate([held[free], held[moving].max(axis=1)])
-        penetration[frame], deepest = _deepest(points, rows[frame], names, excused)
-        limb.append(deepest)
-    return ClothMeasures(penetration, tuple(limb), stretch)
+
+    scene: SimulationScene
+    cache: Cache
+    name: str
+    edges: NDArray[np.int64]
+    lengths: Floats
+    free: NDArray[np.bool_]
+    way: tuple[NDArray[np.int64], Floats] | None = None
+
+    def over(self, frames: Sequence[int] | None) -> ClothMeasures:
+        """Measure in ``frames``; None: in all of the scene."""
+        wanted = range(self.scene.frames) if frames is None else frames
+        rows, names = _volumes(self.scene, wanted)
+        moving = self.edges[self.free[self.edges].any(axis=1)]
+        penetration, limb, stretch = np.zeros(len(wanted)), [], np.empty((len(wanted), len(self.edges)))
+        for place, frame in enumerate(wanted):
+            positions = np.asarray(self.cache.read(self.name, frame)["positions"], np.float64)
+            ends = positions[self.edges[:, 0]] - positions[self.edges[:, 1]]
+            stretch[place] = np.linalg.norm(ends, axis=1) / self.lengths - 1
+            points = np.concatenate([positions[self.free], positions[moving].mean(axis=1)])
+            excused: Floats | float = 0.0
+            if self.way is not None:
+                capsules = np.ascontiguousarray(rows[place])
+                deep = -_kernels.capsule_distances(positions[self.way[0]], capsules)[0]
+                held = np.maximum(deep - self.way[1], 0)
+                excused = np.concatenate([held[self.free], held[moving].max(axis=1)])
+            penetration[place], deepest = _deepest(points, rows[place], names, excused)
+            limb.append(deepest)
+        return ClothMeasures(penetration, tuple(limb), stretch)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +172,7 @@ def measure_particles(scene: SimulationScene, cache: Cache, name: str) -> Partic
     element = next((element for element in scene.elements if element.name == name), None)
     if not isinstance(element, Particles):
         raise ValueError(f"name: {name!r} is no element of particles")
-    rows, names = _volumes(scene)
+    rows, names = _volumes(scene, range(scene.frames))
     penetration, limb = np.zeros(scene.frames), []
     counts = np.zeros((scene.frames, 5), np.int64)
     for frame in range(scene.frames):
@@ -172,13 +185,13 @@ def measure_particles(scene: SimulationScene, cache: Cache, name: str) -> Partic
     return ParticleMeasures(penetration, tuple(limb), *counts[:, [FALLING, SETTLED, DROPLET]].T)
 
 
-def _volumes(scene: SimulationScene) -> tuple[Floats, list[str]]:
-    """The capsules (F, C, 8) of limbs and props, and their names."""
+def _volumes(scene: SimulationScene, frames: Sequence[int]) -> tuple[Floats, list[str]]:
+    """The capsules (F, C, 8) of limbs and props in ``frames``, and their names."""
     props = [element for element in scene.elements if isinstance(element, Prop)]
     limbs = [limb for character in scene.characters for limb in character.limb_names]
     limbs += [prop.name for prop in props for _ in prop.capsules]
     volumes = Volumes(scene, props)
-    return volumes.at(np.arange(scene.frames, dtype=np.float64)), [limbs[index] for index in volumes.known]
+    return volumes.at(np.array(frames, np.float64)), [limbs[index] for index in volumes.known]
 
 
 def _deepest(points: Floats, rows: Floats, names: list[str], excused: Floats | float = 0.0) -> tuple[float, str]:

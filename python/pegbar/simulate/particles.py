@@ -79,7 +79,7 @@ class _Everything:
 
     def __init__(self, scene: SimulationScene, elements: Sequence[Element], colliders: Colliders) -> None:
         self.held, self.step = colliders.held(), 1 / scene.frame_rate / colliders.substeps
-        self.runs = [_Run(scene, element, colliders) for element in elements if isinstance(element, Particles)]
+        self.runs = [ParticleRun(scene, element, colliders) for element in elements if isinstance(element, Particles)]
         ground, pull = scene.ground or 0.0, float(np.linalg.norm(scene.gravity))
         self.snow = [SnowRun(element, ground) for element in elements if isinstance(element, SnowField)]
         self.puddles = [PuddleRun(element, ground, pull) for element in elements if isinstance(element, Puddle)]
@@ -95,7 +95,7 @@ class _Everything:
 
     def take_up(self, cache: Cache, frame: int) -> None:
         """Begin with the states after ``frame``."""
-        kept: list[SnowRun | PuddleRun | _Run] = [*self.snow, *self.puddles, *self.runs]
+        kept: list[SnowRun | PuddleRun | ParticleRun] = [*self.snow, *self.puddles, *self.runs]
         for each in kept:
             each.take_up(cache.read(each.element.name, frame))
 
@@ -111,7 +111,7 @@ class _Everything:
 
     def advance(self, frame: int, colliders: Colliders) -> None:
         """Go on to ``frame``: limbs into fields, splashes, particles, and what has landed into the fields."""
-        around = _Around(colliders.capsules(frame - 1, frame), colliders.vertices(frame - 1))
+        around = Around(colliders.capsules(frame - 1, frame), colliders.vertices(frame - 1))
         around.after = colliders.vertices(frame)
         for snow in self.snow:
             snow.advance(around.capsules)
@@ -132,7 +132,7 @@ class _Everything:
         return [snow.bed for snow in self.snow] + [puddle.bed for puddle in self.puddles]
 
 
-class _Around:
+class Around:
     """What is met in one frame: capsules (S + 1, C, 8), vertices (V, 3) before and after it."""
 
     def __init__(self, capsules: Floats, before: Floats) -> None:
@@ -140,7 +140,7 @@ class _Around:
         self.beds: list[Bed] = []
 
 
-class _Run:
+class ParticleRun:
     """The particles of one element on their way through the frames."""
 
     def __init__(self, scene: SimulationScene, element: Particles, colliders: Colliders) -> None:
@@ -164,10 +164,10 @@ class _Run:
         element, fps = self.element, self.scene.frame_rate
         rng = self.chance(-1 << 20)
         places = rng.uniform(element.low, element.high, (element.count, 3))
-        self._begin(np.arange(element.count), places, rng)
+        self.begin(np.arange(element.count), places, rng)
         stream = float(np.abs(self.stream / (element.high - element.low)).max())
         frames = min(LONGEST_START / 24, 1.2 / stream if stream else 0.0) * fps
-        around = _Around(self.colliders.held(), self.colliders.vertices(0))
+        around = Around(self.colliders.held(), self.colliders.vertices(0))
         around.beds = beds
         for frame in range(-math.ceil(frames), 0):
             self.advance(frame, around)
@@ -192,14 +192,14 @@ class _Run:
     def throw(self, places: Floats, velocities: Floats) -> None:
         """Let drops (n, 3) fly up, as far as there are free slots."""
         slots = np.flatnonzero(self.codes[:, PHASE] == FREE)[: len(places)]
-        self._begin(slots, places[: len(slots)], self.chance(self.emitted, 2))
+        self.begin(slots, places[: len(slots)], self.chance(self.emitted, 2))
         self.motion[slots, 3:6] = velocities[: len(slots)]
 
-    def advance(self, before: int, around: _Around) -> Floats:
+    def advance(self, before: int, around: Around) -> Floats:
         """Go from frame ``before`` to the next; return what came to the ground (n, 4: place and radius)."""
         scene, element = self.scene, self.element
         material, step = element.material, 1 / scene.frame_rate / self.colliders.substeps
-        self._emit(before)
+        self.emit(before)
         lives = (material.lifetime, material.settle, material.splash_life, material.lifetime)
         ground = -math.inf if scene.ground is None else scene.ground
         landed: Floats = _kernels.step_particles(
@@ -220,7 +220,7 @@ class _Run:
         )
         return landed
 
-    def _emit(self, before: int) -> None:
+    def emit(self, before: int) -> None:
         """Let in what enters in the frame after ``before``, at any time of it, as far as there are free slots."""
         element, rng = self.element, self.chance(before)
         expected = self.rates / self.scene.frame_rate
@@ -235,9 +235,10 @@ class _Run:
         places[rows, sides] = entry[sides]
         # Up to a frame's way outside, so that they enter at any time in it.
         places -= rng.random((len(slots), 1)) * self.stream / self.scene.frame_rate
-        self._begin(slots, places, rng)
+        self.begin(slots, places, rng)
 
-    def _begin(self, slots: Integers, places: Floats, rng: np.random.Generator) -> None:
+    def begin(self, slots: Integers, places: Floats, rng: np.random.Generator) -> None:
+        """Let particles fall from ``places`` (n, 3), in free ``slots``."""
         material = self.element.material
         sizes = rng.uniform(1 - material.spread, 1 + material.spread, len(slots)) * material.radius
         self.motion[slots] = np.column_stack([places, np.tile(self.stream, (len(slots), 1)), sizes, 0 * sizes])

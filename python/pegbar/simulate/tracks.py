@@ -37,6 +37,10 @@ def at_times(track: Floats, times: Floats) -> Floats:
     place = np.clip(times, 0, last)
     index = np.minimum(place.astype(int), max(last - 1, 0))
     share = (place - index).reshape(-1, *[1] * (track.ndim - 1))
+    # Slopes of the frames around the times: those of a long shot's whole track would make each of its frames slower.
+    first = max(int(index.min(initial=last)) - 1, 0)
+    track = track[first : int(index.max(initial=0)) + 3]
+    index, last = index - first, last - first
     padded = np.concatenate([track[:1], track, track[-1:]])
     steps = np.diff(padded, axis=0)
     slopes = np.where(steps[:-1] * steps[1:] > 0, (steps[:-1] + steps[1:]) / 2, 0.0)

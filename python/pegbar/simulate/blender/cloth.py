@@ -19,7 +19,7 @@ Arrays = dict[str, NDArray[Any]]
 #: Newtons a metre of width under which a strip grows by its material's ``stretch``.
 PULL = 10.0
 #: Blender's cloth counts time in units of its own, so many seconds whatever the frame rate: it takes gravity times
-#: 0.001 (measured in free fall with 4.5 and 5.0). Forces are times 0.001 for the same reason.
+#: 0.001 (measured in free fall). Forces are times 0.001 for the same reason.
 UNIT = 0.001**0.5
 #: Blender's wind pushes with 0.02 of its units a square metre and strength, over the frames a second (measured).
 WIND_PRESSURE = 0.02
@@ -46,6 +46,7 @@ def cloth_entry(
         "triangles": cloth.triangles,
         "seams": cloth.seams,
         "rest": np.asarray(cloth.rest),
+        "stiff": np.empty(0, np.int64),
         "pins": pins,
         "places": places,
         "launch": launch,
@@ -53,6 +54,7 @@ def cloth_entry(
     }
     entry = {
         "name": name,
+        "points": len(cloth.vertices),
         "settings": settings_of(cloth, substeps, scene.frame_rate),
         "sewn": bool(len(cloth.seams)),
         "pulls": False,

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pegbar.errors import BlenderError
+from pegbar.simulate.blender.bobs import are_alike
 from pegbar.simulate.blender.cloth import cloth_entry, colliders
 from pegbar.simulate.blender.locate import Blender
 from pegbar.simulate.blender.particles import Tell, simulate_particles
@@ -49,15 +50,16 @@ class BlenderEngine:
     name: str = "blender"
 
     def supports(self, element: Element) -> bool:
-        """Whether ``element`` is cloth, a prop, strands without bobs, falling particles, or bodies at rest.
+        """Whether ``element`` is cloth, a prop, strands, falling particles, or bodies at rest.
 
-        Blender knows no speed that a body begins with, and a cloth's vertices have one mass.
+        Blender knows no speed that a body begins with, and a cloth's vertices have one mass: bobs of one element have
+        to be alike.
         """
         if isinstance(element, Balls | Boxes):
             return not element.velocities.any()
         if isinstance(element, Particles):
             return element.count > 0
-        return isinstance(element, Cloth | Prop) or (isinstance(element, Strands) and element.bobs is None)
+        return isinstance(element, Cloth | Prop) or (isinstance(element, Strands) and are_alike(element))
 
     def run(
         self, scene: SimulationScene, elements: Sequence[Element], cache: Cache, start: int, progress: Progress | None

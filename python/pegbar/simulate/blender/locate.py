@@ -15,8 +15,8 @@ from pegbar.errors import BlenderError, MissingExtraError
 
 #: Names the Blender to use: an executable, or a Python that has bpy.
 VARIABLE = "PEGBAR_BLENDER"
-#: Older ones lack calls that our scripts make.
-OLDEST = (4, 5)
+#: The oldest that the tests have run with.
+OLDEST = (3, 4)
 _PATIENCE = 60.0
 _ASK_PYTHON = """
 import importlib.metadata, importlib.util
@@ -29,6 +29,15 @@ except importlib.metadata.PackageNotFoundError:
     version = bpy.app.version_string
 print("Blender", version)
 """
+# What distributions leave out. Debian's Blender uses the system's Python, and asks for no numpy.
+_ASK_BLENDER = """
+import importlib.util, bpy
+built = bpy.app.build_options
+parts = {"cycles": built.cycles, "freestyle": built.freestyle, "bullet": built.bullet}
+parts["numpy"] = importlib.util.find_spec("numpy") is not None
+print("pegbar:lacks", *(name for name, is_there in parts.items() if not is_there))
+"""
+_HELP = {"numpy": "install numpy for the Python that Blender uses (Debian, Ubuntu: apt install python3-numpy)"}
 
 
 @dataclass(frozen=True)
@@ -58,7 +67,7 @@ def find_blender(setting: str | None = None, *, folder: str | Path = ".") -> Ble
     MissingExtraError
         Where there is none; the message says how to install it.
     BlenderError
-        For one that is named and does not exist, is no Blender, or is older than 4.5.
+        For one that is named and does not exist, is no Blender, is older than 3.4, or was built without what we need.
     """
     for named, base in ((setting, Path(folder)), (os.environ.get(VARIABLE), Path())):
         if named:
@@ -73,7 +82,7 @@ def find_blender(setting: str | None = None, *, folder: str | Path = ".") -> Ble
 
 
 def ask_version(program: str) -> Blender:
-    """Return what kind of Blender ``program`` is; BlenderError for none, and for one that is too old."""
+    """Return what kind of Blender ``program`` is; BlenderError for none and for one that is too old or lacks parts."""
     said = _ask([program, "--version"])
     is_python = re.match(r"Python \d", said) is not None
     if is_python:
@@ -85,7 +94,22 @@ def ask_version(program: str) -> Blender:
     if (int(found[1]), int(found[2])) < OLDEST:
         oldest = ".".join(map(str, OLDEST))
         raise BlenderError(f"{program}: Blender {version} is too old: want {oldest} or later")
+    if not is_python:
+        _refuse_without_parts(program, version)
     return Blender(program, is_python, version)
+
+
+def _refuse_without_parts(program: str, version: str) -> None:
+    """Raise BlenderError for an executable that was built, or installed, without something that our scripts use."""
+    said = _ask([program, "--background", "--factory-startup", "--python-expr", _ASK_BLENDER])
+    found = re.search(r"^pegbar:lacks(.*)", said, re.MULTILINE)
+    if found is None:
+        raise BlenderError(f"{program}: Blender {version} runs no scripts: it says {_short(said)}")
+    if lacks := found[1].split():
+        helps = [_HELP.get(name, "take a build from blender.org") for name in lacks]
+        raise BlenderError(
+            f"{program}: Blender {version} is without {', '.join(lacks)}: {'; '.join(dict.fromkeys(helps))}"
+        )
 
 
 def _program(named: str, base: Path) -> str:
@@ -106,7 +130,7 @@ def _ask(command: list[str]) -> str:
             command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=_PATIENCE
         )
     except subprocess.TimeoutExpired:
-        raise BlenderError(f"{command[0]}: no answer to {command[1]} within {_PATIENCE:g} s") from None
+        raise BlenderError(f"{command[0]}: no answer within {_PATIENCE:g} s") from None
     except OSError as error:
         raise BlenderError(f"{command[0]}: it cannot be started: {error.strerror or error}") from None
     said = answer.stdout.decode(errors="replace").strip()

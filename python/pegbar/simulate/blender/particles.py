@@ -19,6 +19,7 @@ from pegbar.errors import BlenderError
 from pegbar.simulate.blender.cloth import air_at, colliders
 from pegbar.simulate.blender.locate import Blender
 from pegbar.simulate.blender.process import INSIDE, run_blender
+from pegbar.simulate.blender.splashes import Aftermath, impacts_of
 from pegbar.simulate.cache import Cache
 from pegbar.simulate.elements import Cloth, Prop
 from pegbar.simulate.engine import refuse_explosion
@@ -145,7 +146,8 @@ def read_particles(path: Path, scene: SimulationScene, element: Particles, entry
 def store_particles(scene: SimulationScene, element: Particles, result: Arrays, cache: Cache, start: int) -> None:
     """Write the frames from ``start`` on: particles of the box that fall, or lie and are not yet melted.
 
-    Blender loses what a fast limb overtakes: what is ``DEEP`` in a volume is gone.
+    Blender loses what a fast limb overtakes: what is ``DEEP`` in a volume is gone. What does not stick at all goes on
+    in our own engine from where it falls on something.
     """
     positions = result["positions"].astype(np.float64)
     # Blender's own velocities go on growing in what lies.
@@ -165,27 +167,28 @@ def store_particles(scene: SimulationScene, element: Particles, result: Arrays, 
         np.arange(scene.frames, dtype=float)
     )
     overtaken = np.zeros(count, bool)
-    for frame in range(scene.frames):
+    after = Aftermath(scene, element, cache, impacts_of(element, result)) if material.stick == 0 else None
+    for frame, places in enumerate(positions):
         landed = ages >= 0
         ages[landed] += (frame > 0) / scene.frame_rate
         ages[~landed & (along[frame] < LANDED)] = 0.0
         landed = ages >= 0
-        places = positions[frame]
         inside = ((places > element.low - MARGIN) & (places < element.high + MARGIN)).all(axis=1)
-        overtaken |= deepest(places, volumes[frame]) > DEEP
+        overtaken |= result["alive"][frame] & (deepest(places, volumes[frame]) > DEEP)
         there = result["alive"][frame] & inside & ~overtaken & (~landed | (stays & (ages < material.settle)))
-        phases = np.where(landed, SETTLED, FALLING)[there]
-        serials = np.flatnonzero(there)
         refuse_explosion(element.name, frame, places[there], speeds[frame, there])
+        serials = np.flatnonzero(there)
+        state = {
+            "positions": places[there],
+            "velocities": speeds[frame, there],
+            "sizes": np.stack([radii, np.maximum(ages, 0)], axis=1)[there],
+            "codes": np.stack([serials, np.full(len(serials), -1), np.where(landed, SETTLED, FALLING)[there]], axis=1),
+        }
+        if after is not None:
+            later = after.go(frame)
+            state = {name: np.concatenate([array, later[name]]) for name, array in state.items()}
         if frame >= start:
-            state = {
-                "positions": places[there],
-                "velocities": speeds[frame, there],
-                "sizes": np.stack([radii, np.maximum(ages, 0)], axis=1)[there],
-                "codes": np.stack([serials, np.full(len(serials), -1), phases], axis=1),
-                "emitted": np.array(count),
-            }
-            cache.write(element.name, frame, state)
+            cache.write(element.name, frame, state | {"emitted": np.array(count)})
 
 
 def deepest(places: Floats, rows: Floats) -> Floats:

@@ -115,7 +115,11 @@ def toon_material(light: list[float], bands: list[float]) -> Any:
     """A surface that shines in its own colour times the band that the cosine between its normal and the light is in."""
     material = bpy.data.materials.new("toon")
     material.use_nodes = True
-    material.cycles.emission_sampling = "NONE"
+    # Called so since 3.5.
+    if hasattr(material.cycles, "emission_sampling"):
+        material.cycles.emission_sampling = "NONE"
+    else:
+        material.cycles.sample_as_light = False
     tree = material.node_tree
     tree.nodes.clear()
     color = add(tree, "ShaderNodeAttribute", attribute_name=COLOR)
@@ -200,6 +204,9 @@ def build_mesh(vertices: Any, triangles: Any, colors: Any, normals: Any) -> Any:
     mesh.loops.foreach_set("vertex_index", np.ascontiguousarray(triangles, np.int32).ravel())
     mesh.polygons.add(len(triangles))
     mesh.polygons.foreach_set("loop_start", np.arange(0, triangles.size, 3, dtype=np.int32))
+    # Until 3.5 a polygon's corners were counted; later ones find them from where the next begins.
+    if not bpy.types.MeshPolygon.bl_rna.properties["loop_total"].is_readonly:
+        mesh.polygons.foreach_set("loop_total", np.full(len(triangles), 3, np.int32))
     mesh.update(calc_edges=True)
     shades = mesh.attributes.new(COLOR, "FLOAT_COLOR", "CORNER")
     shades.data.foreach_set("color", np.ascontiguousarray(colors, np.float32).ravel())

@@ -43,7 +43,8 @@ def main(folder: Path) -> None:
         for name, state in simulate_bodies(job, arrays, tell).items():
             np.savez(folder / f"{name}.npz", **state)
     for cloth in job["cloths"]:
-        np.savez(folder / f"{cloth['name']}.npz", positions=simulate_cloth(job, cloth, arrays, folder, tell))
+        places = simulate_cloth(job, cloth, arrays, folder, tell)
+        np.savez(folder / f"{cloth['name']}.npz", positions=places[:, : cloth["points"]])
 
 
 def simulate_bodies(job: dict[str, Any], arrays: dict[str, Any], tell: Progress) -> dict[str, dict[str, Any]]:
@@ -125,7 +126,8 @@ def simulate_cloth(
 ) -> Any:
     """One cloth, settled in the pre-roll and then let go with the speed of its pins; its positions (F, n, 3)."""
     name, early = cloth["name"], job["pre_roll"]
-    given = {what: arrays[f"{name}_{what}"] for what in ("start", "rest", "pins", "places", "launch", "wind")}
+    kinds = ("start", "rest", "stiff", "pins", "places", "launch", "wind")
+    given = {what: arrays[f"{name}_{what}"] for what in kinds}
     run = ClothRun(job, cloth, arrays[f"{name}_triangles"], arrays[f"{name}_seams"], folder, tell)
     collider, triangles, begin = arrays["collider"], arrays["collider_triangles"], given["start"]
     if early:
@@ -178,6 +180,7 @@ class ClothRun:
         follow(built, self.folder / "cloth.pc2", track)
         hold(built, given["pins"].tolist())
         set_cloth(built, cloth, total, settles)
+        stiffen(built, given["stiff"].tolist())
         if collider[0].shape[1]:
             volumes = new_object(scene, "volumes", collider[0][0], collider[1])
             follow(volumes, self.folder / "volumes.pc2", collider[0])
@@ -226,6 +229,18 @@ def set_cloth(built: Any, cloth: dict[str, Any], total: int, settles: bool) -> N
     meets.distance_min = meets.self_distance_min = cloth["thickness"]
     meets.friction, meets.use_self_collision = cloth["friction"], cloth["self_collision"]
     modifier.point_cache.frame_start, modifier.point_cache.frame_end = 1, total
+
+
+def stiffen(built: Any, stiff: list[int]) -> None:
+    """Let what is between ``stiff`` vertices keep its shape, and only their triangles meet each other."""
+    if not stiff:
+        return
+    cloth = built.modifiers["cloth"]
+    built.vertex_groups.new(name="stiff").add(stiff, 1.0, "REPLACE")
+    limp = sorted(set(range(len(built.data.vertices))) - set(stiff))
+    built.vertex_groups.new(name="limp").add(limp, 1.0, "REPLACE")
+    cloth.settings.vertex_group_structural_stiffness = "stiff"
+    cloth.collision_settings.vertex_group_self_collisions = "limp"
 
 
 if __name__ == "__main__":
