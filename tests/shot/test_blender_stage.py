@@ -10,7 +10,8 @@ import pytest
 from pegbar.cli.main import main
 from pegbar.io.exr import read_passes
 from pegbar.sample.shot import write_sample
-from pegbar.shot.secondary_stage import SecondaryStage, own_work
+from pegbar.shot.secondary import Secondary
+from pegbar.shot.secondary_stage import SecondaryStage
 from pegbar.simulate.chains import Bobs
 from pegbar.simulate.elements import Balls, Strands
 from pegbar.simulate.engine import assign
@@ -99,16 +100,36 @@ def test_what_blender_lacks_is_simulated_by_our_engines(shot):
         Particles("snow", (0, 0, 0), (1, 1, 1), 5),
         Particles("drops", (0, 0, 0), (1, 1, 1), 0),
     ]
-    engines, scene = SecondaryStage(shot, engine="blender").engines, SimulationScene(24, 2, elements)
-    shares = assign(scene, engines)
-    assert own_work(scene, engines) == ["Blender cannot simulate thrown, bunch, drops: pegbar's own engines do"]
-    assert own_work(scene, SecondaryStage(shot).engines) == []
+    stage, scene = SecondaryStage(shot, engine="blender"), SimulationScene(24, 2, elements)
+    shares = assign(scene, stage.engines)
+    assert stage.own_work(scene) == ["Blender cannot simulate thrown, bunch, drops: pegbar's own engines do"]
+    assert SecondaryStage(shot).own_work(scene) == []
     assert {engine.name: [element.name for element in share] for engine, share in shares} == {
         "blender": ["balls", "balloon", "rope", "snow"],
         "rapier": ["thrown"],
         "strands": ["bunch"],
         "particles": ["drops"],
     }
+
+
+def test_another_run_that_has_blender_render_is_waited_for(shot, capsys):
+    fake_blender(shot.parent, RENDERS.format(spoil="pass"))
+    fcntl = pytest.importorskip("fcntl")
+    lock = shot.parent / "secondary/blender/.pegbar/run.lock"
+    lock.parent.mkdir(parents=True, exist_ok=True)
+    with lock.open("w") as held:
+        fcntl.flock(held, fcntl.LOCK_EX)
+        assert main(["secondary", str(shot), "--jobs", "1", "--renderer", "blender", "--overwrite"]) == 2
+    assert "another pegbar is at work here" in capsys.readouterr().err
+    assert main(["secondary", str(shot), "--jobs", "1", "--renderer", "blender", "--overwrite"]) == 0
+
+
+def test_another_blender_simulates_anew(shot):
+    recipes = set()
+    for version in ("5.0.1", "4.5.3"):
+        fake_blender(shot.parent, says=f"Blender {version}")
+        recipes |= {Secondary(shot, engine=engine).recipe() for engine in ("pegbar", "blender")}
+    assert len(recipes) == 3
 
 
 def test_a_crash_while_simulating_is_told(shot, capsys):

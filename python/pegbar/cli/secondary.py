@@ -61,6 +61,8 @@ def _run(stage: SecondaryStage, options: BatchOptions) -> int:
         except (SimulationError, BlenderError) as error:
             print(f"pegbar: {error}; what was made before is kept", file=sys.stderr)
             return 1
+    for note in stage.own_work(scene) if stage.made["simulation"] else ():
+        print(f"pegbar: note: {note}", file=sys.stderr)
     print(f"simulation: {scene.frames} frame{'' if scene.frames == 1 else 's'} {_made(stage, 'simulation')}")
     frames = stage.frames(drivings, scene)
     if code := _render(stage, frames, options):

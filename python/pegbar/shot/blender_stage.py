@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from pegbar.errors import BlenderError
+from pegbar.io.hold import hold
 from pegbar.shot.passes_stage import BANDS, INK, Layers, pen_width
 from pegbar.shot.record import fingerprint, is_up_to_date, write_record
 from pegbar.shot.rendered import read_rendered
@@ -37,8 +38,13 @@ class BlenderStage:
     def run(self, frames: Sequence[int], progress: Callable[[int, int], None] | None = None) -> int:
         """Render those of the film's ``frames`` that are out of date; return how many.
 
-        Raises BlenderError where Blender fails; what it had finished is kept.
+        Raises BlenderError where Blender fails; what it had finished is kept. BusyError where another run is at it.
         """
+        assert self.layers.rendered is not None
+        with hold(self.layers.rendered.path(0).parent):
+            return self._run(frames, progress)
+
+    def _run(self, frames: Sequence[int], progress: Callable[[int, int], None] | None) -> int:
         todo = [frame for frame in frames if not self.is_done(frame)]
         models = Models(self.layers.scene) if todo else None
         for first in range(0, len(todo), CHUNK):
@@ -58,7 +64,6 @@ class BlenderStage:
     def _render(self, frames: Sequence[int], models: Models, tell: Callable[[int], None]) -> None:
         layers, kept = self.layers, 0
         target = self._path(frames[0]).parent
-        target.mkdir(parents=True, exist_ok=True)
         prints = [[fingerprint(path) for path in self._inputs(frame)] for frame in frames]
         size = layers.scene.cameras[0].image_size
         pen = pen_width(size)

@@ -164,7 +164,7 @@ class Secondary:
         parts: list[Any] = [VERSION, entries, section.ground, section.gravity, section.wind.model_dump()]
         parts += [section.pre_roll, section.seed, self.frames, self.names]
         parts += [self.stages[0].bare.settings.shot.frame_rate]
-        parts += [] if section.engine == "pegbar" else [section.engine]
+        parts += [] if section.engine == "pegbar" else [section.engine, self.blender.version]
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 
     def inputs(self) -> list[Path]:

@@ -98,8 +98,16 @@ class SecondaryStage:
         with self._timed("simulation"):
             scene = self.secondary.scene(drivings)
             self.made["simulation"] = SimulationStage(self.secondary, scene, self.engines).run(self.progress)
-            self.remarks.add(own_work(scene, self.engines), made=self.made["simulation"])
+            self.remarks.add(self.own_work(scene), made=self.made["simulation"])
         return scene
+
+    def own_work(self, scene: SimulationScene) -> list[str]:
+        """Return a note of the elements that Blender, asked to simulate, leaves to our own engines."""
+        if self.secondary.section.engine == "pegbar":
+            return []
+        shares = [share for engine, share in assign(scene, self.engines) if not isinstance(engine, BlenderEngine)]
+        left = ", ".join(element.name for share in shares for element in share)
+        return [f"Blender cannot simulate {left}: pegbar's own engines do"] if left else []
 
     def frames(self, drivings: list[Driving], scene: SimulationScene) -> ElementsStage:
         """Return the stage that renders and composites, frame by frame."""
@@ -178,19 +186,6 @@ class SecondaryStage:
     def _told(self, name: str) -> Callable[[int, int], None] | None:
         tell = self.progress
         return None if tell is None else lambda done, total: tell(name, done, total)
-
-
-def own_work(scene: SimulationScene, engines: Sequence[Engine]) -> list[str]:
-    """Return a note of the elements that Blender, asked to simulate, leaves to our own engines."""
-    if not any(isinstance(engine, BlenderEngine) for engine in engines):
-        return []
-    left = [
-        element.name
-        for engine, share in assign(scene, engines)
-        if not isinstance(engine, BlenderEngine)
-        for element in share
-    ]
-    return [f"Blender cannot simulate {', '.join(left)}: pegbar's own engines do"] if left else []
 
 
 def _reprojection(driving: Driving) -> float:
