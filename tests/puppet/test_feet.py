@@ -63,7 +63,11 @@ def test_locked_legs_keep_their_length_and_move_smoothly(walking):
     assert np.isfinite(made.meshes).all()
     lengths = np.linalg.norm(np.diff(made.poses[:, puppet.bones], axis=2)[:, :, 0], axis=2)
     drawn = np.linalg.norm(np.diff(rest[puppet.bones], axis=1)[:, 0], axis=1)
-    np.testing.assert_allclose(lengths, np.broadcast_to(drawn, lengths.shape), rtol=1e-6)
+    # Only shoulders and hips, which keep their places in the picture, may be a little nearer to the spine.
+    across = np.array([puppet.names[child].endswith(("_shoulder", "_hip")) for child in puppet.bones[:, 1]])
+    wanted = np.broadcast_to(drawn, lengths.shape)
+    np.testing.assert_allclose(lengths[:, ~across], wanted[:, ~across], rtol=1e-6)
+    np.testing.assert_allclose(lengths[:, across], wanted[:, across], rtol=0.05)
     # Twice the speed of the clip's own feet in the figure's scale is no jump.
     feet = [leg.foot for leg in standing_legs(puppet)]
     assert (np.linalg.norm(np.diff(made.poses[:, feet], axis=0), axis=2) * 30).max() < 5

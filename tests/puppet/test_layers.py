@@ -98,3 +98,21 @@ def test_nothing_hidden_is_a_sliver(test_data):
     for layer in layers:
         thick = cv2.morphologyEx(layer.region.view(np.uint8), cv2.MORPH_OPEN, np.ones((5, 5), np.uint8)) > 0
         assert (layer.region & ~layer.drawn & ~thick).sum() <= 10, layer.name
+
+
+def test_a_hidden_arm_is_behind_the_body_though_the_clip_has_it_in_front():
+    plan, _, _ = cut(figure(-60, hidden=("right_shoulder", "right_elbow")), view="side")
+    assert plan.names == ("left arm", "body", "left leg", "right arm")
+
+
+def test_an_animals_trunk_does_not_stick_out_under_its_belly_behind_a_leg(test_data):
+    source = prepare_figure(read_puppet_input(test_data / "drawings/animated_drawings/char6/char_cfg.yaml"))
+    plan = plan_figure(source, read_motion(test_data / "mocap/bvh/cmu_35_01.bvh"))
+    layers = cut_layers(source, source.mask, Parts(source.bone_map, source.radii), plan.layers)
+    body = layers[plan.layers.names.index("body")]
+    hidden = body.region & ~body.drawn
+    assert hidden.sum() > 500
+    # Beside the leg that hides it the belly is drawn down to these rows.
+    columns = np.flatnonzero(hidden.any(axis=0))
+    beside = [np.flatnonzero(body.drawn[:, column]).max() for column in (columns.min() - 2, columns.max() + 2)]
+    assert np.argwhere(hidden)[:, 0].max() <= max(beside) + 4

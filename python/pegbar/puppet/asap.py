@@ -17,6 +17,7 @@ from pegbar.errors import DegenerateError
 from pegbar.puppet.bone_weights import bone_weights
 from pegbar.puppet.drawn_pose import focal_lengths
 from pegbar.puppet.inflation import inflation_heights
+from pegbar.puppet.trunk import Trunk
 from pegbar.scene.camera import PerspectiveCamera
 from pegbar.scene.puppet import Puppet
 
@@ -47,13 +48,14 @@ class AsapShapes:
     """The mesh of a figure in the coordinates of its bones, ready to be seen in other poses.
 
     ``bones`` (B, 2) index the joints of poses, ``parts`` has an entry for each bone that moves vertices, ``count`` is
-    the number of vertices.
+    the number of vertices, ``trunk`` tells how broad the trunk is.
     """
 
     bones: Ints
     parts: tuple[BoneCoordinates, ...]
     count: int
     camera: PerspectiveCamera
+    trunk: Trunk
 
     @classmethod
     def of_puppet(cls, puppet: Puppet, pose: ArrayLike, *, inflation: float = 1.0) -> AsapShapes:
@@ -91,14 +93,17 @@ class AsapShapes:
                 points += (heights[chosen] * metres)[:, None] * frame[:, 2]
                 local = np.linalg.solve(frame, (points - origin).T).T
                 parts.append(BoneCoordinates(bone, chosen, weights[chosen, bone], local))
-        return cls(puppet.bones, tuple(parts), len(puppet.vertices), puppet.camera)
+        return cls(puppet.bones, tuple(parts), len(puppet.vertices), puppet.camera, Trunk.of_puppet(puppet, joints))
 
     def points(self, poses: ArrayLike) -> Floats:
         """Return the mesh (F, n, 3) in world metres, moved with the bones of ``poses`` (F, J, 3)."""
         joints = arrays.floats("poses", poses, ("F", "J", 3))
         origins, frames = bone_frames(joints, self.bones, self.camera.position)
         result = np.zeros((len(joints), self.count, 3))
+        broad = self.trunk.breadths(self.camera, joints)
         for part in self.parts:
+            if part.bone in self.trunk.spine:
+                frames[:, part.bone, :, 0] *= broad[:, None]
             moved = part.local @ frames[:, part.bone].transpose(0, 2, 1) + origins[:, part.bone, None]
             result[:, part.vertices] += part.weights[:, None] * moved
         return result

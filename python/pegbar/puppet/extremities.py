@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pegbar.puppet.retarget import rotations_between, towards_picture
+from pegbar.puppet.limits import towards_picture
+from pegbar.puppet.retarget import rotations_between
 from pegbar.scene.puppet import Puppet
 
 Floats = NDArray[np.float64]

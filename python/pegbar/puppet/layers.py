@@ -28,6 +28,7 @@ BODY = "body"
 _SLIVER = 0.4
 #: The part of a sliver's rim that touches the limb whose it is.
 _TOUCH = 0.3
+_ROUNDS = 3
 #: How much thinner a hidden limb is taken to be than the limb beside it shows.
 _SLIM = 0.9
 
@@ -76,7 +77,7 @@ def layer_limbs(limbs: Sequence[DrawnLimb], view: View) -> tuple[list[DrawnLimb]
     """
     own = [limb for limb in limbs if limb.beside]
     if view in ("half profile", "side", "half back"):
-        arms = [limb for limb in limbs if limb.kind == "arm"]
+        arms = sorted((limb for limb in limbs if limb.kind == "arm"), key=lambda limb: limb.hidden)
         legs = [limb for limb in limbs if limb.kind == "leg"]
         # The near leg goes with the body, but not where it comes out from under a coat, which it would tear.
         apart = [*arms, *(leg for leg in legs if leg.covered or leg is not legs[0])]
@@ -128,7 +129,8 @@ def cut_layers(source: PuppetInput, mask: Flags, parts: Parts, plan: LayerPlan) 
     layers, before_it = [], np.zeros_like(mask)
     drawn = _drawn(source, mask, parts, plan)
     for name, bones, joint, own in zip(plan.names, plan.bones, plan.joints, drawn, strict=True):
-        hidden = _opened(own | (_expected(source, parts, bones) & before_it), _sliver(source, parts)) & before_it & ~own
+        hidden = _opened(own | (_expected(source, parts, bones, own) & before_it), _sliver(source, parts))
+        hidden &= before_it & ~own
         region = _joined(own | hidden, source, bones)
         parent = -1 if joint < 0 else plan.names.index(BODY)
         layers.append(Layer(name, bones, own & region, region, joint, parent))
@@ -142,7 +144,9 @@ def _drawn(source: PuppetInput, mask: Flags, parts: Parts, plan: LayerPlan) -> l
     body = plan.names.index(BODY)
     if source.segmentation is None:
         _claim(source, parts, plan, drawn)
-        give_slivers(drawn, body, _sliver(source, parts))
+        # What is left beside a sliver that was given may be one now.
+        for _ in range(_ROUNDS):
+            give_slivers(drawn, body, _sliver(source, parts))
     for index, (joint, bones) in enumerate(zip(plan.joints, plan.bones, strict=True)):
         held = _capsules(source, bones, np.ones(len(source.bones)), mask)
         pieces = _joined(drawn[index] | held, source, bones)
@@ -199,11 +203,32 @@ def _opened(region: Flags, width: float) -> Flags:
     return np.asarray(cv2.morphologyEx(region.view(np.uint8), cv2.MORPH_OPEN, disc), bool)
 
 
-def _expected(source: PuppetInput, parts: Parts, bones: tuple[int, ...]) -> Flags:
-    """Where a layer may well be, also where it is hidden: around its bones, and the trunk without dents."""
+def _expected(source: PuppetInput, parts: Parts, bones: tuple[int, ...], own: Flags) -> Flags:
+    """Where a layer that is drawn in ``own`` may well be, also where it is hidden: around its bones, the trunk without
+    dents. An animal's trunk is wide where a leg hangs on it, but no wider there than beside the leg.
+    """
     radii = _SLIM * np.minimum(parts.radii, _twins(source, parts.radii))
-    expected = _capsules(source, bones, radii, np.ones(parts.bones.shape, bool))
+    limbs = {bone for chain in limb_chains(source.names, source.bones) for bone in chain}
+    holds = [bone for bone in bones if bone not in limbs and not _is_trunk(source, bone) and _holds_limb(source, bone)]
+    everywhere = np.ones(parts.bones.shape, bool)
+    expected = _capsules(source, [bone for bone in bones if bone not in holds], radii, everywhere)
+    if holds:
+        expected |= _capsules(source, holds, radii, _closed(own, 2 * float(radii[holds].max())))
     return expected | _hull(source, parts, bones)
+
+
+def _holds_limb(source: PuppetInput, bone: int) -> bool:
+    """Whether other bones hang on a bone's end."""
+    return bool((source.bones[:, 0] == source.bones[bone, 1]).any())
+
+
+def _closed(region: Flags, radius: float) -> Flags:
+    """A region with the dents and gaps that a disc of this radius does not reach into (morphological closing)."""
+    reach = max(1, round(radius))
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
+    padded = np.pad(region.view(np.uint8), reach)
+    closed = cv2.morphologyEx(padded, cv2.MORPH_CLOSE, disc)[reach:-reach, reach:-reach]
+    return np.asarray(closed, bool)
 
 
 def _hull(source: PuppetInput, parts: Parts, bones: tuple[int, ...]) -> Flags:

@@ -18,6 +18,7 @@ from pegbar.puppet.occlusion import Pieces, piece_ranks
 from pegbar.puppet.pose_blend import blend_poses, closed_loop, ease
 from pegbar.puppet.retarget import body_scale, facing_turn, retarget
 from pegbar.puppet.root_path import follow, ground_poses, horizontal_path
+from pegbar.puppet.turning import shown_turn, turned_markers
 from pegbar.scene.motion import Motion
 from pegbar.scene.puppet import Puppet
 
@@ -214,7 +215,11 @@ def _joined(
         times, _ = clip_times(motion, direction.first, direction.last, rate)
         markers = clip_markers(puppet, motion, times)
         markers = markers if before is None else continued(puppet, markers, before)
-        notes += _turned_notes(puppet, markers, reference, times)
+        turned = facing_turn(puppet, markers, reference)
+        notes += _turned_notes(turned, times)
+        if puppet.fitted:
+            anchor = int(np.abs(times - puppet.pose_frame).argmin())
+            markers = turned_markers(markers, shown_turn(turned, rate) - turned, root, anchor)
         own = _on_the_ground(puppet, rest, motion, markers, reference, times, rate, direction)
         way = horizontal_path(markers[:, root], reference[root], scale, direction.travel)
         if before is not None:
@@ -262,13 +267,12 @@ def _between(puppet: Puppet, first: Floats, second: Floats, count: int) -> Float
     return np.concatenate([first[None], blend_poses(puppet.bones, first, second, ease(count))])
 
 
-def _turned_notes(puppet: Puppet, markers: Floats, reference: Floats, times: Floats) -> Iterator[str]:
+def _turned_notes(turned: Floats, times: Floats) -> Iterator[str]:
     """What to say of a clip that turns the figure past what the picture shows."""
-    turned = np.abs(facing_turn(puppet, markers, reference))
-    past = np.flatnonzero(turned > PAST_VIEW)
+    past = np.flatnonzero(np.abs(turned) > PAST_VIEW)
     if len(past):
         first, last = times[past[0]], times[past[-1]]
         yield (
-            f"the clip turns the figure {turned.max():.0f} degrees away from the drawn view (frames {first:.0f} to "
-            f"{last:.0f}): the picture shows only one side of it"
+            f"the clip turns the figure {np.abs(turned).max():.0f} degrees away from the drawn view (frames "
+            f"{first:.0f} to {last:.0f}): the picture shows only one side of it, so it turns less"
         )

@@ -10,12 +10,12 @@ import math
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
 from pegbar import arrays
 from pegbar.errors import DegenerateError
 from pegbar.puppet.drawn_pose import LIMB_ENDS, moved_bones
+from pegbar.puppet.limits import limited_swing, shown_across, towards_picture
 from pegbar.scene.gait import facing
 from pegbar.scene.puppet import Puppet
 
@@ -29,8 +29,10 @@ Floats = NDArray[np.float64]
 _BUILD, _SAME, _NEAR = (10.0, 20.0), (30.0, 75.0), (5.0, 40.0)
 # A figure that is like no pose of the clip (an animal) is as deep as is guessed: of its limbs so much is seen at least.
 _FLAT = 0.8
-# Frames over which a direction is smoothed that the picture hardly tells, and the seen share up to which it does so.
-_LAG, _STEADY = 3.0, 0.7
+# Heads are about round: of what is drawn between neck and crown so much is seen at least.
+_HEAD = 0.85
+#: The joints that lie beside the spine: bones that lead to them lie across the trunk.
+ACROSS_ENDS = ("_shoulder", "_hip")
 #: How the difference between the drawn limbs and the clip's is treated.
 KEEPS = ("near", "always", "never")
 
@@ -68,13 +70,16 @@ def retarget(
     moved = moved_bones(puppet)
     before = arrays.floats("reference", reference, (joints, 3), allow="nan")
     _refuse_missing(puppet, clip, moved)
-    turns = Rotation.from_euler("y", facing_turn(puppet, clip, before)[:, None], degrees=True)
+    turned = facing_turn(puppet, clip, before)
+    turns = Rotation.from_euler("y", turned[:, None], degrees=True)
     body, trunk = turns, np.zeros(len(moved), bool)
+    across = np.unique(puppet.bones[moved & _ending(puppet, ACROSS_ENDS)])
+    tilt = _tilt(_trunk_turns(clip, before, across) * turns.inv(), puppet.camera.rotation[2])
     if not puppet.fitted:
         # It is always seen from the drawn side, with its trunk all of a piece.
         clip, turns = _turned(clip, turns.inv()), Rotation.identity()
-        trunk = moved & _trunk_bones(puppet)
-        body = _tilt(_trunk_turns(clip, before, np.unique(puppet.bones[trunk])), puppet.camera.rotation[2])
+        trunk = moved & ~_ending(puppet, (*LIMB_ENDS, "head"))
+        body = tilt = _tilt(_trunk_turns(clip, before, np.unique(puppet.bones[trunk])), puppet.camera.rotation[2])
     result = np.zeros(clip.shape)
     root = int(np.flatnonzero(puppet.parents < 0)[0])
     result[:, root] = rest[root]
@@ -85,15 +90,10 @@ def retarget(
             rotations[child] = body
             along = body.apply(own)
         elif is_moved:
-            seen = _unit(before[child] - before[parent])
-            offset = rotations_between(seen, _unit(own)[None])[0]
-            directions = turns.inv().apply(_unit(clip[:, child] - clip[:, parent]))
-            shares = _kept(offset, directions @ seen, keep, puppet.drives[puppet.names[child]])
-            directions = (turns * Rotation.from_rotvec(shares[:, None] * offset.as_rotvec())).apply(directions)
-            if not puppet.fitted:
-                directions = towards_picture(directions, puppet.camera.rotation, _FLAT)
-            rotations[child] = rotations_between(_unit(own), directions)
-            along = directions * np.linalg.norm(own)
+            pointing = _unit(clip[:, child] - clip[:, parent]), _unit(before[child] - before[parent])
+            directions = _pointed(own, *pointing, turns, keep, puppet.drives[puppet.names[child]])
+            along = _shown(puppet, child, directions * np.linalg.norm(own), own, turned, tilt)
+            rotations[child] = rotations_between(_unit(own), _unit(along))
         else:
             rotations[child] = rotations[parent]
             along = rotations[child].apply(own)
@@ -125,40 +125,34 @@ def facing_turn(puppet: Puppet, clip: Floats, reference: Floats) -> Floats:
     return np.nan_to_num(turned - 360 * np.round(known[0] / 360)) if len(known) else np.zeros(len(clip))
 
 
-def towards_picture(along: Floats, axes: Floats, least: float) -> Floats:
-    """Vectors (F, 3) turned back towards the picture, so that ``least`` of their length is seen at least.
+def _pointed(own: Floats, clip: Floats, before: Floats, turns: Rotation, keep: str, marker: str) -> Floats:
+    """Where a bone drawn as ``own`` (3,) points (F, 3) when the clip's, ``before`` (3,), points as ``clip`` (F, 3)."""
+    offset = rotations_between(before, _unit(own)[None])[0]
+    directions = turns.inv().apply(clip)
+    shares = _kept(offset, directions @ before, keep, marker)
+    pointed: Floats = (turns * Rotation.from_rotvec(shares[:, None] * offset.as_rotvec())).apply(directions)
+    return pointed
 
-    ``axes`` (3, 3) are the camera's: right, down and forward.
+
+def _shown(puppet: Puppet, child: int, along: Floats, own: Floats, turned: Floats, tilt: Rotation) -> Floats:
+    """A bone to ``child`` (F, 3), turned back where the picture would give out; ``tilt`` is the trunk's in the picture.
+
+    Of a person only the head's and the trunk's bones are.
     """
-    right, down, deep = (along @ axes.T).T
-    length = np.linalg.norm(along, axis=1)
-    seen = np.hypot(right, down) / length
-    # The outline of an ellipsoid of half axes 1 and r that is seen from an angle.
-    wanted = np.sqrt(seen**2 + least**2 * (1 - seen**2))
-    angles = _steady(np.arctan2(down, right), seen)
-    towards = np.sign(deep) * np.sqrt(np.maximum(1 - wanted**2, 0))
-    shown = np.stack([wanted * np.cos(angles), wanted * np.sin(angles), towards], axis=1)
-    result: Floats = length[:, None] * (shown @ axes)
-    return result
+    axes, marker = puppet.camera.rotation, puppet.drives[puppet.names[child]]
+    if not puppet.fitted:
+        return limited_swing(towards_picture(along, axes, _FLAT), tilt.apply(own), axes)
+    if marker.endswith(ACROSS_ENDS):
+        return shown_across(along, own, axes, turned, tilt)
+    if marker == "head":
+        return towards_picture(along, axes, _HEAD, float(np.linalg.norm((axes @ _unit(own))[:2])))
+    return along
 
 
-def _steady(angles: Floats, seen: Floats) -> Floats:
-    """Angles (F,) in radians, smoothed where what they are the direction of is hardly seen: ``seen`` (F,), 0 to 1."""
-    turned = np.unwrap(angles)
-    weights = seen + 1e-3
-    smooth = gaussian_filter1d(weights * turned, _LAG, mode="nearest") / gaussian_filter1d(
-        weights, _LAG, mode="nearest"
-    )
-    share = np.clip(seen / _STEADY, 0, 1)
-    share = share * share * (3 - 2 * share)
-    steady: Floats = share * turned + (1 - share) * smooth
-    return steady
-
-
-def _trunk_bones(puppet: Puppet) -> NDArray[np.bool_]:
-    """Which bones (B,) are the trunk's: those of no limb, and not the head's."""
-    ends = [puppet.drives.get(puppet.names[child]) or "" for child in puppet.bones[:, 1].tolist()]
-    return np.array([not end.endswith((*LIMB_ENDS, "head")) for end in ends], bool)
+def _ending(puppet: Puppet, ends: tuple[str, ...]) -> NDArray[np.bool_]:
+    """Which bones (B,) lead to joints that such markers drive."""
+    markers = [puppet.drives.get(puppet.names[child]) or "" for child in puppet.bones[:, 1].tolist()]
+    return np.array([marker.endswith(ends) for marker in markers], bool)
 
 
 def _turned(points: Floats, turns: Rotation) -> Floats:

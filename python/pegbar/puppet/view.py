@@ -82,6 +82,13 @@ def drawn_view(source: PuppetInput) -> View:
     return "side" if wide <= _HALF else "half back" if behind else "half profile"
 
 
+def near_side(source: PuppetInput) -> int:
+    """Which side of the figure is nearer: 1 the left, -1 the right, by where more joints are hidden; 0 unknown."""
+    hidden = {name for name, seen in zip(source.names, source.visible, strict=True) if not seen}
+    count = [sum(name.startswith(side) for name in hidden) for side in ("left_", "right_")]
+    return (count[1] > count[0]) - (count[0] > count[1])
+
+
 def seen_pose(
     source: PuppetInput, motion: Motion, *, view: View | None = None, field_of_view: float | None = None
 ) -> SeenPose:
@@ -122,7 +129,8 @@ def seen_pose(
     if fit is None or fit.error > NO_FIT * extent or _is_animal(source):
         return _as_drawn(source, motion, poses, view, field_of_view)
     poor = fit.error > POOR_FIT * extent
-    choice, azimuth, found = _choice(fit, points, towards, view or (drawn_view(source) if poor else None))
+    wanted = view or (drawn_view(source) if poor else None)
+    choice, azimuth, found = _choice(fit, points, towards, wanted, near_side(source))
     camera, error = fit.cameras[choice], float(fit.errors[choice])
     assert camera is not None
     frame = int(frames[choice])
@@ -176,8 +184,11 @@ def _facing(motion: Motion) -> Floats:
     return np.zeros(len(motion.positions)) if azimuth is None else np.nan_to_num(azimuth)
 
 
-def _choice(fit: PoseFit, points: Floats, towards: Floats, wanted: View | None) -> tuple[int, float, View]:
-    """The best pose of the wanted view, how far beside its facing the camera stands, and the view."""
+def _choice(fit: PoseFit, points: Floats, towards: Floats, wanted: View | None, near: int) -> tuple[int, float, View]:
+    """The best pose of the wanted view, how far beside its facing the camera stands, and the view.
+
+    Poses that show the ``near`` side (1 left, -1 right, 0 unknown) are taken before others.
+    """
     found = []
     for pose in fit.ranking[: np.isfinite(fit.costs).sum()].tolist():
         camera = fit.cameras[pose]
@@ -189,6 +200,8 @@ def _choice(fit: PoseFit, points: Floats, towards: Floats, wanted: View | None) 
     if not fitting:
         assert wanted is not None
         return (*found[0][:2], wanted)
+    # Marks alone hardly tell a figure from its mirror image in depth; a camera to its left sees the left side.
+    fitting = [entry for entry in fitting if near * math.sin(math.radians(entry[1])) >= 0] or fitting
     # Of poses that are about as alike the one is taken that faces as the clip mostly does: a pose in the middle of a
     # turn would show the rest of the clip from the wrong side.
     turned = np.abs((towards[:, None] - towards[None, :] + 180) % 360 - 180)
