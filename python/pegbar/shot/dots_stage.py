@@ -67,8 +67,10 @@ class DotsStage:
         section, joints = self._section(), self.joints()
         drawings, dots, keys = self.sequences()
         inputs = [drawings.path(number) for number in drawings.numbers] + [dots.path(number) for number in keys]
-        recipe = self._recipe(joints)
-        if not self.overwrite and is_up_to_date([self.output], recipe, inputs):
+        recipe = self._recipe(joints, self._rate())
+        # Marks that say no frame rate suit any that the shot file says since.
+        known = (recipe, self._recipe(joints, None))
+        if not self.overwrite and any(is_up_to_date([self.output], each, inputs) for each in known):
             return (), False
         numbers = drawings.numbers if section.carry != "none" else keys
         colors = np.array([parse_color(color) for color in joints], np.uint8).reshape(-1, 3)
@@ -160,8 +162,8 @@ class DotsStage:
             return tuple(hold) if len(hold) == count else ()
         return (hold,) * count if isinstance(hold, int) and hold > 1 else ()
 
-    def _recipe(self, joints: dict[str, str]) -> str:
-        parts: list[Any] = [VERSION, self._section().model_dump(), joints, self._rate(), self.settings.drawing.hold]
+    def _recipe(self, joints: dict[str, str], rate: float | None) -> str:
+        parts: list[Any] = [VERSION, self._section().model_dump(), joints, rate, self.settings.drawing.hold]
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 
 
