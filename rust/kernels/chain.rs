@@ -7,7 +7,8 @@
 //! Bending: an implicit step of a rod that is straight at rest, with the energy B/2 * curvature^2 per metre. It is linear
 //! in the points, the same along x, y and z, and its matrix has two bands; it is factored once a frame.
 
-use glam::{DMat3, DVec3};
+use crate::symmetric::Symmetric;
+use glam::DVec3;
 
 /// Links grow by this share where the strand's whole mass, its bob's too, pulls with `LOAD`.
 const GROWTH: f64 = 1e-3;
@@ -53,8 +54,9 @@ pub struct Lengths {
     /// Newtons per metre by link, times the substep squared: kilogrammes.
     springs: Vec<f64>,
     start: Vec<DVec3>,
-    diagonal: Vec<DMat3>,
-    beside: Vec<DMat3>,
+    diagonal: Vec<Symmetric>,
+    /// The block between a point and the next with its sign turned; zero where either is pinned.
+    beside: Vec<Symmetric>,
     right: Vec<DVec3>,
 }
 
@@ -67,7 +69,7 @@ impl Lengths {
         let give = |point: &Point| point.compliance + GROWTH * point.length / pull;
         let springs = points.iter().map(|point| step * step / give(point).max(f64::MIN_POSITIVE)).collect();
         let (zero, count) = (DVec3::ZERO, points.len());
-        let blocks = || vec![DMat3::ZERO; count];
+        let blocks = || vec![Symmetric::ZERO; count];
         Lengths {
             masses,
             springs,
@@ -89,47 +91,53 @@ impl Lengths {
 
     fn assemble(&mut self, points: &[Point], places: &[DVec3]) {
         for (k, mass) in self.masses.iter().enumerate() {
-            self.diagonal[k] = DMat3::from_diagonal(DVec3::splat(*mass));
+            self.diagonal[k] = Symmetric::scaled_identity(*mass);
             self.right[k] = *mass * (self.start[k] - places[k]);
         }
         for (link, pair) in places.windows(2).enumerate() {
             let (way, length, spring) = (pair[1] - pair[0], points[link].length, self.springs[link]);
             let now = way.length();
-            if now <= SHORT {
-                self.beside[link] = DMat3::ZERO;
+            let free = [self.masses[link] > 0.0, self.masses[link + 1] > 0.0];
+            self.beside[link] = Symmetric::ZERO;
+            if now <= SHORT || free == [false; 2] {
                 continue;
             }
             let along = way / now;
             let turning = (1.0 - length / now).max(0.0);
-            let lengthwise = DMat3::from_cols(along * along.x, along * along.y, along * along.z);
-            let block = spring * ((1.0 - turning) * lengthwise + turning * DMat3::IDENTITY);
+            let block = Symmetric::stiffness(along, spring * (1.0 - turning), spring * turning);
             let pull = spring * (now - length) * along;
             self.diagonal[link] += block;
             self.diagonal[link + 1] += block;
             self.right[link] += pull;
             self.right[link + 1] -= pull;
-            let both_free = self.masses[link] > 0.0 && self.masses[link + 1] > 0.0;
-            self.beside[link] = if both_free { -block } else { DMat3::ZERO };
+            if free == [true; 2] {
+                self.beside[link] = block;
+            }
         }
     }
 
     /// Block tridiagonal elimination; pinned points stay.
     fn solve(&mut self, places: &mut [DVec3]) {
         let count = places.len();
-        let mut inverse = DMat3::ZERO;
         for k in 0..count {
-            if k > 0 {
-                let share = self.beside[k - 1] * inverse;
-                self.diagonal[k] -= share * self.beside[k - 1];
-                let before = self.right[k - 1];
-                self.right[k] -= share * before;
+            if self.masses[k] == 0.0 {
+                continue;
             }
-            inverse = if self.masses[k] > 0.0 { self.diagonal[k].inverse() } else { DMat3::ZERO };
-            self.diagonal[k] = inverse;
+            if k > 0 && self.masses[k - 1] > 0.0 {
+                let (inverse, block) = (self.diagonal[k - 1], self.beside[k - 1]);
+                inverse.take_between(block, &mut self.diagonal[k]);
+                let before = inverse * self.right[k - 1];
+                self.right[k] += block * before;
+            }
+            self.diagonal[k] = self.diagonal[k].inverse();
         }
         let mut after = DVec3::ZERO;
         for k in (0..count).rev() {
-            after = self.diagonal[k] * (self.right[k] - self.beside[k] * after);
+            if self.masses[k] == 0.0 {
+                after = DVec3::ZERO;
+                continue;
+            }
+            after = self.diagonal[k] * (self.right[k] + self.beside[k] * after);
             places[k] += after;
         }
     }
@@ -143,6 +151,8 @@ pub struct Bending {
     /// Its factors: the diagonal and the bands.
     diagonal: Vec<f64>,
     factors: Vec<[f64; 2]>,
+    /// Room for the right side.
+    right: Vec<DVec3>,
 }
 
 impl Bending {
@@ -166,7 +176,7 @@ impl Bending {
             bands[middle + 1][0] += stiff * row[1] * row[2];
             bands[middle + 1][1] += stiff * row[0] * row[2];
         }
-        let mut made = Bending { masses, bands, diagonal, factors: vec![[0.0; 2]; count] };
+        let mut made = Bending { masses, bands, diagonal, factors: vec![[0.0; 2]; count], right: Vec::new() };
         made.factor();
         Some(made)
     }
@@ -197,24 +207,24 @@ impl Bending {
     }
 
     /// Moves `places` to where bending brings them at the end of the substep.
-    pub fn relax(&self, places: &mut [DVec3]) {
+    pub fn relax(&mut self, places: &mut [DVec3]) {
         let count = places.len();
+        let mut right = std::mem::take(&mut self.right);
         let held = |row: usize| if self.is_held(row) { places[row] } else { DVec3::ZERO };
-        let mut right: Vec<DVec3> = (0..count)
-            .map(|row| {
-                if self.is_held(row) {
-                    return places[row];
-                }
-                let mut sum = self.masses[row] * places[row];
-                for back in 1..=row.min(2) {
-                    sum -= self.bands[row][back - 1] * held(row - back);
-                }
-                for ahead in 1..=(count - 1 - row).min(2) {
-                    sum -= self.bands[row + ahead][ahead - 1] * held(row + ahead);
-                }
-                sum
-            })
-            .collect();
+        right.clear();
+        right.extend((0..count).map(|row| {
+            if self.is_held(row) {
+                return places[row];
+            }
+            let mut sum = self.masses[row] * places[row];
+            for back in 1..=row.min(2) {
+                sum -= self.bands[row][back - 1] * held(row - back);
+            }
+            for ahead in 1..=(count - 1 - row).min(2) {
+                sum -= self.bands[row + ahead][ahead - 1] * held(row + ahead);
+            }
+            sum
+        }));
         for row in 1..count {
             for back in 1..=row.min(2) {
                 let known = right[row - back];
@@ -228,6 +238,7 @@ impl Bending {
             }
             places[row] = place;
         }
+        self.right = right;
     }
 }
 
@@ -296,7 +307,7 @@ mod tests {
             .collect();
         let step = 0.2;
         let before: Vec<DVec3> = (0..6).map(|k| DVec3::new(f64::from(k) * 0.1, f64::from(k * k % 5), 1.0)).collect();
-        let Some(bending) = Bending::new(&points, step) else { unreachable!() };
+        let Some(mut bending) = Bending::new(&points, step) else { unreachable!() };
         let mut after = before.clone();
         bending.relax(&mut after);
         // M (x - x*) + h^2 sum of B / l * g (g . x) = 0 at every free point, with g = (1, -2, 1) / l.

@@ -57,6 +57,7 @@ pub mod strand;
 pub mod surface;
 pub mod surroundings;
 pub mod sweep;
+pub mod symmetric;
 pub mod texels;
 pub mod textured;
 pub mod triangulate;

@@ -154,7 +154,7 @@ impl Thread<'_> {
         for (point, pin) in &self.pins {
             self.places[*point] = drive.targets[substep * drive.pins.len() + pin];
         }
-        if let Some(bending) = &self.bending {
+        if let Some(bending) = &mut self.bending {
             bending.relax(self.places);
         }
         self.lengths.restore(&self.points, drive.rounds, self.places);

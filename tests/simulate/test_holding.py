@@ -68,6 +68,19 @@ def test_it_is_in_the_hand_and_over_the_head():
             assert np.hypot(*(middle - head[frame])[[0, 2]]) < 0.25 * body_height(figure)
 
 
+def test_a_hand_before_the_face_holds_the_shaft_past_the_head():
+    figure = walker(FRAMES, speed=0.0)
+    markers = figure.markers.copy()
+    head, hand = (figure.marker_names.index(name) for name in ("head", "left_hand"))
+    markers[:, hand] = markers[:, head] + (0.0, -0.45, 0.3)
+    figure = replace(figure, markers=markers)
+    (umbrella,) = preset_elements("umbrella", figure, hand="left", tilt=45.0)
+    low, axis, _ = shaft(umbrella.vertices)
+    way = markers[0, head] - low
+    assert 0.12 < np.linalg.norm(np.cross(way, axis)) < 0.2
+    assert (low + (way @ axis) * axis)[2] > markers[0, head, 2], "on the hand's side"
+
+
 def shaft(places: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     """The shaft's lower end, its direction and length."""
     rings = places[8 * 40 :].reshape(2, 8, 3).mean(axis=1)

@@ -179,9 +179,10 @@ def test_lines_grow_apart_to_the_corners_and_keep_the_nodes():
     assert lines_of(replace(field, beyond=None))[0].tolist() == places_of(field, (5, 7))[0].tolist()
 
 
-def test_shadows_go_on_beyond_the_field(walked):
+@pytest.mark.parametrize("corner", [0.3, -0.5])
+def test_shadows_go_on_beyond_the_field(walked, corner):
     scene, snow, cache = walked
-    small = replace(snow, heights=np.full((5, 5), 0.1), origin=np.array([0.3, 0.3]), soles=None)
+    small = replace(snow, heights=np.full((5, 5), 0.1), origin=np.array([corner, corner]), soles=None)
     scene = replace(scene, elements=(small,))
     cache = MemoryCache()
     simulate_scene(scene, cache, [ParticleEngine()])
@@ -193,6 +194,7 @@ def test_shadows_go_on_beyond_the_field(walked):
     figure = scene.characters[0]
     ahead = np.array([marker(figure, name)[0, [0, 2]] for name in ("pelvis", "head")])
     assert len(places) > 20
+    assert (np.abs(places - ahead.mean(axis=0)) < 0.12).all(axis=1).any()
     assert np.abs(places - ahead.mean(axis=0)).max() < 0.8
     assert mesh.vertices[:, 1] == pytest.approx(0.1)
 
