@@ -9,6 +9,9 @@
 use crate::error::{KernelError, check_length};
 use rayon::prelude::*;
 
+/// Farther reduced nothing is seen, and the filter would look at the whole picture for every film pixel.
+const MOST: f64 = 1e4;
+
 /// A camera's view: film pixel (x, y) shows the place `[v0 x + v1 y + v2, v3 x + v4 y + v5]` of the picture.
 pub type View = [f64; 6];
 
@@ -140,7 +143,7 @@ pub fn nearest(known: &[u8], width: usize, view: &View, out: &mut [i64], film_wi
 /// The closest pixel that `at` knows, among those less than `reach` away along both axes.
 fn closest(x: f64, y: f64, reach: f64, size: [usize; 2], at: impl Fn(f64, f64) -> Option<usize>) -> Option<usize> {
     let [columns, rows] = [(x, size[0]), (y, size[1])].map(|(place, count)| {
-        let first = (place - reach).floor().max(-1.0) as i64 + 1;
+        let first = (place - reach).floor().clamp(-1.0, count as f64) as i64 + 1;
         first..(place + reach).ceil().clamp(0.0, count as f64) as i64
     });
     let (mut found, mut least) = (None, f64::INFINITY);
@@ -166,10 +169,10 @@ fn rows(argument: &'static str, length: usize, width: usize) -> Result<usize, Ke
 /// How many of the picture's pixels a film pixel is wide.
 fn scale(view: &View) -> Result<f64, KernelError> {
     let scale = (view[0] * view[4] - view[1] * view[3]).abs().sqrt();
-    if view.iter().all(|value| value.is_finite()) && scale > 0.0 && scale.is_finite() {
+    if view.iter().all(|value| value.is_finite()) && scale > 0.0 && scale <= MOST {
         return Ok(scale);
     }
-    Err(KernelError::Argument { argument: "view", problem: "want a finite view that can be turned back" })
+    Err(KernelError::Argument { argument: "view", problem: "want a finite view that reduces by 10000 at most" })
 }
 
 /// How much of a film pixel `scale` wide lies on the paper, along one axis.
@@ -261,8 +264,20 @@ mod tests {
     }
 
     #[test]
+    fn a_view_far_from_the_paper_sees_nothing() -> Result<(), KernelError> {
+        for far in [1e18, -1e18, 1e300, -1e300] {
+            assert_eq!(seen([1.0, 0.0, far, 0.0, 1.0, far], (3, 1))?, [0.0; 3]);
+            let mut out = [9; 3];
+            nearest(&[1; 6], 3, &[1.0, 0.0, far, 0.0, 1.0, -far], &mut out, 3)?;
+            assert_eq!(out, [-1; 3]);
+        }
+        Ok(())
+    }
+
+    #[test]
     fn what_is_no_view_is_refused() {
-        for view in [[0.0; 6], [1.0, 0.0, f64::NAN, 0.0, 1.0, 0.0], [1.0, 1.0, 0.0, 1.0, 1.0, 0.0]] {
+        let far = [2e4, 0.0, 0.0, 0.0, 2e4, 0.0];
+        for view in [[0.0; 6], [1.0, 0.0, f64::NAN, 0.0, 1.0, 0.0], [1.0, 1.0, 0.0, 1.0, 1.0, 0.0], far] {
             assert!(seen(view, (3, 2)).is_err());
         }
         let mut out = [[0.0f32]; 5];
