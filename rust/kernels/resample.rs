@@ -15,6 +15,7 @@ const MOST: f64 = 1e4;
 /// A camera's view: film pixel (x, y) shows the place `[v0 x + v1 y + v2, v3 x + v4 y + v5]` of the picture.
 pub type View = [f64; 6];
 
+#[inline]
 fn place(view: &View, column: usize, row: usize) -> [f64; 2] {
     let (x, y) = (column as f64, row as f64);
     [view[0] * x + view[1] * y + view[2], view[3] * x + view[4] * y + view[5]]
@@ -34,6 +35,7 @@ impl Taps {
         Self { pixels: Vec::with_capacity(most), weights: Vec::with_capacity(most), near: 0..0 }
     }
 
+    #[inline]
     fn put(&mut self, place: f64, reach: f64, count: usize) {
         if reach == 1.0 {
             return self.put_four(place, count);
@@ -51,6 +53,7 @@ impl Taps {
     }
 
     /// Without a reduction: four pixels, whose weights are exactly 0, 1, 0, 0 on a pixel's centre.
+    #[inline]
     fn put_four(&mut self, place: f64, count: usize) {
         let (before, last) = (place.floor(), count as i64 - 1);
         let t = (place - before) as f32;
@@ -68,6 +71,7 @@ impl Taps {
     }
 }
 
+#[inline]
 fn keys(distance: f64) -> f64 {
     let x = distance.abs();
     if x < 1.0 {
@@ -176,11 +180,13 @@ fn scale(view: &View) -> Result<f64, KernelError> {
 }
 
 /// How much of a film pixel `scale` wide lies on the paper, along one axis.
+#[inline]
 fn covered(place: f64, count: usize, scale: f64) -> f64 {
     let inside = (place + 0.5).min(count as f64 - 0.5 - place);
     (0.5 + inside / scale).clamp(0.0, 1.0)
 }
 
+#[inline]
 fn weighed<const C: usize>(picture: &[[f32; C]], width: usize, across: &Taps, down: &Taps) -> [f32; C] {
     let mut sum = [0.0f32; C];
     let (mut low, mut high) = ([f32::INFINITY; C], [f32::NEG_INFINITY; C]);
