@@ -9,9 +9,13 @@
 use crate::error::{KernelError, check_length};
 use rayon::prelude::*;
 
+/// Farther reduced nothing is seen, and the filter would look at the whole picture for every film pixel.
+const MOST: f64 = 1e4;
+
 /// A camera's view: film pixel (x, y) shows the place `[v0 x + v1 y + v2, v3 x + v4 y + v5]` of the picture.
 pub type View = [f64; 6];
 
+#[inline]
 fn place(view: &View, column: usize, row: usize) -> [f64; 2] {
     let (x, y) = (column as f64, row as f64);
     [view[0] * x + view[1] * y + view[2], view[3] * x + view[4] * y + view[5]]
@@ -31,6 +35,7 @@ impl Taps {
         Self { pixels: Vec::with_capacity(most), weights: Vec::with_capacity(most), near: 0..0 }
     }
 
+    #[inline]
     fn put(&mut self, place: f64, reach: f64, count: usize) {
         if reach == 1.0 {
             return self.put_four(place, count);
@@ -48,6 +53,7 @@ impl Taps {
     }
 
     /// Without a reduction: four pixels, whose weights are exactly 0, 1, 0, 0 on a pixel's centre.
+    #[inline]
     fn put_four(&mut self, place: f64, count: usize) {
         let (before, last) = (place.floor(), count as i64 - 1);
         let t = (place - before) as f32;
@@ -65,6 +71,7 @@ impl Taps {
     }
 }
 
+#[inline]
 fn keys(distance: f64) -> f64 {
     let x = distance.abs();
     if x < 1.0 {
@@ -140,7 +147,7 @@ pub fn nearest(known: &[u8], width: usize, view: &View, out: &mut [i64], film_wi
 /// The closest pixel that `at` knows, among those less than `reach` away along both axes.
 fn closest(x: f64, y: f64, reach: f64, size: [usize; 2], at: impl Fn(f64, f64) -> Option<usize>) -> Option<usize> {
     let [columns, rows] = [(x, size[0]), (y, size[1])].map(|(place, count)| {
-        let first = (place - reach).floor().max(-1.0) as i64 + 1;
+        let first = (place - reach).floor().clamp(-1.0, count as f64) as i64 + 1;
         first..(place + reach).ceil().clamp(0.0, count as f64) as i64
     });
     let (mut found, mut least) = (None, f64::INFINITY);
@@ -166,18 +173,20 @@ fn rows(argument: &'static str, length: usize, width: usize) -> Result<usize, Ke
 /// How many of the picture's pixels a film pixel is wide.
 fn scale(view: &View) -> Result<f64, KernelError> {
     let scale = (view[0] * view[4] - view[1] * view[3]).abs().sqrt();
-    if view.iter().all(|value| value.is_finite()) && scale > 0.0 && scale.is_finite() {
+    if view.iter().all(|value| value.is_finite()) && scale > 0.0 && scale <= MOST {
         return Ok(scale);
     }
-    Err(KernelError::Argument { argument: "view", problem: "want a finite view that can be turned back" })
+    Err(KernelError::Argument { argument: "view", problem: "want a finite view that reduces by 10000 at most" })
 }
 
 /// How much of a film pixel `scale` wide lies on the paper, along one axis.
+#[inline]
 fn covered(place: f64, count: usize, scale: f64) -> f64 {
     let inside = (place + 0.5).min(count as f64 - 0.5 - place);
     (0.5 + inside / scale).clamp(0.0, 1.0)
 }
 
+#[inline]
 fn weighed<const C: usize>(picture: &[[f32; C]], width: usize, across: &Taps, down: &Taps) -> [f32; C] {
     let mut sum = [0.0f32; C];
     let (mut low, mut high) = ([f32::INFINITY; C], [f32::NEG_INFINITY; C]);
@@ -261,8 +270,20 @@ mod tests {
     }
 
     #[test]
+    fn a_view_far_from_the_paper_sees_nothing() -> Result<(), KernelError> {
+        for far in [1e18, -1e18, 1e300, -1e300] {
+            assert_eq!(seen([1.0, 0.0, far, 0.0, 1.0, far], (3, 1))?, [0.0; 3]);
+            let mut out = [9; 3];
+            nearest(&[1; 6], 3, &[1.0, 0.0, far, 0.0, 1.0, -far], &mut out, 3)?;
+            assert_eq!(out, [-1; 3]);
+        }
+        Ok(())
+    }
+
+    #[test]
     fn what_is_no_view_is_refused() {
-        for view in [[0.0; 6], [1.0, 0.0, f64::NAN, 0.0, 1.0, 0.0], [1.0, 1.0, 0.0, 1.0, 1.0, 0.0]] {
+        let far = [2e4, 0.0, 0.0, 0.0, 2e4, 0.0];
+        for view in [[0.0; 6], [1.0, 0.0, f64::NAN, 0.0, 1.0, 0.0], [1.0, 1.0, 0.0, 1.0, 1.0, 0.0], far] {
             assert!(seen(view, (3, 2)).is_err());
         }
         let mut out = [[0.0f32]; 5];

@@ -12,6 +12,8 @@ from typing import Any
 from pegbar.scene.camera_moves import EASES, TRACKS, CameraKey, CameraMoves, Track
 
 _COLUMNS = (*TRACKS, "ease")
+# What is more than this is a slip of the finger.
+_MOST_ZOOM, _FARTHEST = 1000.0, 1_000_000
 _NUMBER = r"[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][-+]?\d+)?"
 # Camera work in words that are numbers: "zoom 1.5", "pan_x = 20, pan_y = -4".
 _SAID = re.compile(rf"(pan_x|pan_y|zoom|rotate)\s*[=:]?\s*({_NUMBER})(?:\s*[,;]\s*|\s+|$)", re.IGNORECASE)
@@ -132,8 +134,10 @@ def _number(cell: CameraCell) -> float:
     value = float(text.replace(",", ".")) if re.fullmatch(_NUMBER, text) else math.nan
     if not math.isfinite(value):
         raise ValueError(f"{cell.column}: want a number, got {text!r}")
-    if cell.column == "zoom" and value <= 0:
-        raise ValueError(f"zoom: want a number above 0, got {text!r}")
+    if cell.column == "zoom" and not 1 / _MOST_ZOOM <= value <= _MOST_ZOOM:
+        raise ValueError(f"zoom: want a number from {1 / _MOST_ZOOM:g} to {_MOST_ZOOM:g}, got {text!r}")
+    if abs(value) > _FARTHEST:
+        raise ValueError(f"{cell.column}: want a number from -{_FARTHEST} to {_FARTHEST}, got {text!r}")
     return value
 
 
