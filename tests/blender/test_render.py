@@ -44,7 +44,10 @@ def still_life() -> list[Mesh]:
     corners += [(7 * i + j, 7 * i + j + 8, 7 * i + j + 1) for i in range(8) for j in range(6)]
     colors = np.random.default_rng(1).uniform(0, 1, (63, 4)).astype(np.float32)
     colors[:, 3] = 1
-    return [*Models(scene).meshes(cache, 0), Mesh(places, np.array(corners), colors, 300)]
+    # A flake, whose normals look to the light however its triangles are turned.
+    flake = np.array([[-0.2, 0.9, 0.6], [0.1, 0.9, 0.6], [0.1, 1.1, 0.6], [-0.2, 1.1, 0.6]])
+    lit = Mesh(flake, np.array([[0, 2, 1], [0, 2, 3]]), (0.7, 0.8, 1.0, 1.0), 0xFF05, np.tile(LIGHT, (4, 1)))
+    return [*Models(scene).meshes(cache, 0), Mesh(places, np.array(corners), colors, 300), lit]
 
 
 def cameras() -> dict[str, PerspectiveCamera]:
@@ -85,7 +88,9 @@ def test_depth_ids_and_colours_are_those_of_our_renderer(
     assert np.isinf(theirs.depth[theirs.coverage == 0]).all()
     colors = np.abs(ours.beauty - theirs.beauty).max(axis=2)[same]
     assert (colors < 2e-3).mean() > 0.98
-    assert set(np.unique(theirs.object_id)) == {0, 1, 2, 300}
+    assert set(np.unique(theirs.object_id)) == {0, 1, 2, 300, 0xFF05}
+    flake = theirs.beauty[same & (theirs.object_id == 0xFF05)]
+    assert np.abs(flake - (0.7, 0.8, 1.0, 1.0)).max() < 2e-3
 
 
 def test_ink_has_a_depth_and_lies_around_what_it_outlines(blender: Blender, tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from pegbar.scene.volumes import TaperedCylinders
 from pegbar.simulate.blender.cloth import UNIT, cloth_entry, colliders, settings_of, wind_of
 from pegbar.simulate.blender.engine import BlenderEngine, limb_arrays
 from pegbar.simulate.blender.locate import Blender, find_blender
-from pegbar.simulate.blender.render import BlenderJob, camera_of, passes_of, squared, welded
+from pegbar.simulate.blender.render import BlenderJob, camera_of, passes_of, squared, welded, write_meshes
 from pegbar.simulate.blender.strands import Web, strand_settings, strands_entry
 from pegbar.simulate.cache import MemoryCache
 from pegbar.simulate.chains import Bobs
@@ -164,6 +164,22 @@ def test_cloth_meets_limbs_balls_and_boxes_where_the_cache_has_them():
     sides = vertices[4][triangles[-12:]]
     outward = np.cross(sides[:, 1] - sides[:, 0], sides[:, 2] - sides[:, 0])
     assert (np.einsum("ti,ti->t", outward, sides.mean(axis=1) - box.centers[0]) > 0).all()
+
+
+def test_triangles_are_turned_to_where_their_normals_look(tmp_path):
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1.0, 0]])
+    colors = np.eye(4, dtype=np.float32)
+    mesh = Mesh(square, np.array([[0, 1, 2], [0, 3, 2]]), colors, 1, np.tile((0.1, 0, 1.0), (4, 1)))
+    camera = PerspectiveCamera.look_at((0, 0, 3.0), (0, 0, 0), (16, 16), 0.8)
+    write_meshes(tmp_path / "m.npz", [mesh], camera)
+    with np.load(tmp_path / "m.npz") as file:
+        places, sides, shades = file["vertices_0"], file["triangles_0"], file["colors_0"]
+    corners = places[sides]
+    assert (np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2] > 0).all()
+    # Colours stay with their corners.
+    for side, shade in zip(corners, shades.reshape(2, 3, 4), strict=True):
+        for place, color in zip(side, shade, strict=True):
+            assert np.array_equal(color, colors[np.flatnonzero((square == place).all(axis=1))[0]])
 
 
 def test_a_cloth_is_told_with_its_pins_speed_and_wind():

@@ -161,6 +161,16 @@ def test_the_engine_puts_particles_into_the_cache(tmp_path):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="the pretended programs are scripts")
+@pytest.mark.parametrize("what", ["positions", "velocities"])
+def test_a_particle_whose_place_is_no_number_is_gone(tmp_path, what):
+    cache = MemoryCache()
+    simulate_scene(scene_of(snow(10)), cache, [engine_that(tmp_path, f"state['{what}'][1:3, 5, 0] = np.nan")])
+    gone = [5 not in cache.read("snow", frame)["codes"][:, 0] for frame in range(4)]
+    assert gone == [False, True, True, True]
+    assert np.isfinite(cache.read("snow", 3)["velocities"]).all()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="the pretended programs are scripts")
 @pytest.mark.parametrize(
     ("spoil", "problem"),
     [

@@ -22,7 +22,7 @@ from pegbar.simulate.blender.render import BlenderJob
 from pegbar.simulate.meshes import Models
 from pegbar.simulate.passes import Ink
 
-VERSION = 1
+VERSION = 2
 # Frames that one Blender renders: it starts in two seconds, and this many frames' meshes are some hundred megabytes.
 CHUNK = 24
 
@@ -88,7 +88,7 @@ class BlenderStage:
 
     def _frame(self, frame: int, models: Models) -> tuple[str, Any, Any]:
         index = frame - self.layers.first
-        return f"frame_{frame}", self.layers.scene.cameras[index], models.meshes(self.layers.cache, index)
+        return f"frame_{frame}", self.layers.scene.cameras[index], self.layers.meshes(models, frame)[0]
 
     def _path(self, frame: int) -> Path:
         assert self.layers.rendered is not None
@@ -102,5 +102,5 @@ class BlenderStage:
     def _recipe(self) -> str:
         section = self.layers.section
         parts: list[Any] = [VERSION, self.blender.version, [entry.model_dump() for entry in section.elements]]
-        parts += [section.seed, section.samples, self.layers.first]
+        parts += [section.seed, section.samples, section.shadow, self.layers.scene.ground, self.layers.first]
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -64,6 +63,20 @@ class Layers:
     scales: tuple[float, ...] = ()
     rendered: FrameSequence | None = None
 
+    def meshes(self, models: Models, frame: int) -> tuple[list[Mesh], list[Mesh]]:
+        """Return the elements' meshes in the film's ``frame``, fields with shadows on them, and what casts shadows.
+
+        Shadows are cast by the elements but particles and what lies on the ground, and by the characters.
+        """
+        scene, index = self.scene, frame - self.first
+        meshes = models.meshes(self.cache, index)
+        casting: list[Mesh] = []
+        if self.section.shadow and scene.ground is not None:
+            flat = {scene.object_id(e.name) for e in scene.elements if isinstance(e, SnowField | Puddle)}
+            casting = [mesh for mesh in meshes if mesh.object_id < BARE and mesh.object_id not in flat]
+            casting += volume_meshes(scene, index)
+        return cast_on_fields(scene, meshes, casting, light=LIGHT), casting
+
 
 @dataclass(frozen=True, eq=False)
 class ElementsStage(Stage):
@@ -113,10 +126,8 @@ class ElementsStage(Stage):
         """Return what is seen of the elements in ``frame`` and of their and the characters' shadows."""
         layers = self.layers
         index, samples, ground = frame - layers.first, layers.section.samples, layers.scene.ground
-        camera, meshes = layers.scene.cameras[index], self.models.meshes(layers.cache, index)
+        camera, (meshes, casting) = layers.scene.cameras[index], layers.meshes(self.models, frame)
         pen = pen_width(camera.image_size)
-        casting = self._casting(meshes, index) if layers.section.shadow and ground is not None else []
-        meshes = cast_on_fields(layers.scene, meshes, casting, light=LIGHT)
         window = seen_window(camera, meshes, casting, ground or 0.0, pen)
         part = part_of(camera, window)
         # A shadow of its own is only for the file; without one it is rendered along with the elements.
@@ -132,13 +143,6 @@ class ElementsStage(Stage):
             shadow = render_shadow(casting, part, ground, samples=samples, light=LIGHT)
             lay_under(passes, shadow)
         return View(camera.image_size, window, passes, shadow)
-
-    def _casting(self, meshes: Sequence[Mesh], index: int) -> list[Mesh]:
-        """What casts shadows: the elements but particles and what lies on the ground, and the characters."""
-        scene = self.layers.scene
-        flat = {scene.object_id(e.name) for e in scene.elements if isinstance(e, SnowField | Puddle)}
-        raised = [mesh for mesh in meshes if mesh.object_id < BARE and mesh.object_id not in flat]
-        return raised + volume_meshes(scene, index)
 
     def _composite(self, frame: int, view: View) -> tuple[NDArray[Any], tuple[str, ...]]:
         """Put one character after the other into what is rendered, the shot's own first."""

@@ -35,6 +35,8 @@ Tell = Callable[[int, int], None]
 LANDED = 0.4
 #: Metres in a volume at which a particle is gone.
 DEEP = 0.005
+#: Where a particle is put whose place is no number: outside of every box.
+AWAY = 1e6
 #: Strength of Blender's turbulence that makes what falls at 1 m/s sway at 1 m/s (measured).
 TURBULENCE = 3.8
 
@@ -128,10 +130,13 @@ def chance(scene: SimulationScene, element: Particles) -> np.random.Generator:
 
 
 def read_particles(path: Path, scene: SimulationScene, element: Particles, entry: dict[str, Any]) -> Arrays:
-    """Read what Blender made of ``element``; BlenderError where it is not what was asked for."""
+    """Read what Blender made of ``element``; BlenderError where it is not what was asked for.
+
+    From where a place or speed is no number the particle is gone.
+    """
     try:
         with np.load(path, allow_pickle=False) as file:
-            found = {name: np.asarray(file[name]) for name in ("positions", "velocities", "alive", "before", "born")}
+            found = {name: np.array(file[name]) for name in ("positions", "velocities", "alive", "before", "born")}
     except (ValueError, KeyError, EOFError, OSError, zipfile.BadZipFile) as error:
         raise BlenderError(f"{element.name}: what Blender wrote cannot be read: {error}") from None
     count = element.count + entry["entering"]
@@ -140,6 +145,10 @@ def read_particles(path: Path, scene: SimulationScene, element: Particles, entry
     for name, want in wanted.items():
         if found[name].shape != want:
             raise BlenderError(f"{element.name}: Blender wrote {name} of shape {found[name].shape}, want {want}")
+    lost = ~(np.isfinite(found["positions"]) & np.isfinite(found["velocities"])).all(axis=2)
+    lost = np.logical_or.accumulate(lost, axis=0)
+    found["alive"][lost], found["positions"][lost], found["velocities"][lost] = False, AWAY, 0.0
+    found["before"][~np.isfinite(found["before"]).all(axis=1)] = AWAY
     return found | {"early": np.array(entry["pre_roll"])}
 
 

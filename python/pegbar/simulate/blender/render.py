@@ -118,6 +118,9 @@ def write_meshes(path: Path, meshes: Sequence[Mesh], view: PerspectiveCamera) ->
         vertices, triangles, kept = welded(mesh)
         corners = mesh.triangles[kept]
         assert mesh.normals is not None
+        # As in `rust/kernels/surface.rs` the front is where the normals look, whichever way the triangle is turned.
+        against = opposed(mesh.vertices[corners], mesh.normals[corners])
+        corners[against], triangles[against] = corners[against, ::-1], triangles[against, ::-1]
         parts |= {
             f"vertices_{index}": squared(vertices, view).astype(np.float32),
             f"triangles_{index}": triangles.astype(np.int32),
@@ -126,6 +129,12 @@ def write_meshes(path: Path, meshes: Sequence[Mesh], view: PerspectiveCamera) ->
         }
     with path.open("wb") as file:
         np.savez(file, **parts)  # type: ignore[arg-type]
+
+
+def opposed(sides: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which triangles (T,) with corners ``sides`` (T, 3, 3) are turned against their corners' ``normals`` (T, 3, 3)."""
+    outward = np.cross(sides[:, 1] - sides[:, 0], sides[:, 2] - sides[:, 0])
+    return np.asarray((outward * normals.sum(axis=1)).sum(axis=1) < 0)
 
 
 def _index(object_id: int) -> int:

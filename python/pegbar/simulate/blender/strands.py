@@ -55,7 +55,7 @@ def strands_entry(scene: SimulationScene, strands: Strands, name: str, substeps:
         "pulls": web.balls is None,
         "thickness": max(0.001, float(strands.radii.mean())),
         "friction": strands.material.friction,
-        "collision_quality": 4,
+        "collision_quality": 2 if web.balls is None else 4,
         # Strings do not meet each other, bobs do.
         "self_collision": web.balls is not None and len(strands.counts) > 1,
     }
