@@ -71,10 +71,7 @@ def read_puppet_input(
     if given is not None and not given.exists():
         raise FileNotFoundError(2, "no such file or directory", str(given))
     if joints is None:
-        names = f"{picture.stem}.json, {picture.stem}.yaml, {', '.join(BESIDE)}"
-        raise FileNotFoundError(
-            2, f"no joints are marked beside the picture (looked for {names}; --joints names another)", str(picture)
-        )
+        raise _unmarked(picture)
     drawing = read_annotations(joints)
     place = _frame(drawing, given, frame)
     if given is None and not drawing.images:
@@ -101,6 +98,13 @@ def read_puppet_input(
         limbs=tuple(limb for limb in drawing.limbs if limb.color is not None),
         files=(given, Path(joints), *masks, *drawing.segmentations[place : place + 1]),
     )
+
+
+def _unmarked(picture: Path) -> FileNotFoundError:
+    """What to say of a picture without joints beside it."""
+    names = f"{picture.stem}.json, {picture.stem}.yaml, {', '.join(BESIDE)}"
+    told = f"no joints are marked beside the picture (looked for {names}; --joints names another)"
+    return FileNotFoundError(2, told, str(picture))
 
 
 def _frame(drawing: Drawing, picture: Path | None, frame: int | None) -> int:
