@@ -38,6 +38,7 @@ pub mod particles;
 pub mod pinhole;
 pub mod pose;
 pub mod raster;
+pub mod resample;
 pub mod resolve;
 pub mod rim;
 pub mod robust;

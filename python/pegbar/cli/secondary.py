@@ -63,7 +63,7 @@ def _run(stage: SecondaryStage, options: BatchOptions) -> int:
             return 1
     for note in stage.own_work(scene) if stage.made["simulation"] else ():
         print(f"pegbar: note: {note}", file=sys.stderr)
-    print(f"simulation: {scene.frames} frames {_made(stage, 'simulation')}")
+    print(f"simulation: {scene.frames} frame{'' if scene.frames == 1 else 's'} {_made(stage, 'simulation')}")
     frames = stage.frames(drivings, scene)
     if code := _render(stage, frames, options):
         return code

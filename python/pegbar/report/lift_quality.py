@@ -74,7 +74,9 @@ def notes(
     if lost := [name for name in alignment.names if name not in lifted.names]:
         found.append(f"the clip has no joint for {', '.join(lost)}: left out")
     poses = alignment.clip - np.nanmean(alignment.clip, axis=1, keepdims=True)
-    if float(np.nanmax(np.ptp(poses, axis=0))) < _STILL:
+    if len(numbers) == 1:
+        found.append("one drawing is one pose: one frame is written for each that shows it")
+    elif float(np.nanmax(np.ptp(poses, axis=0))) < _STILL:
         found.append("the clip stands still: all depth is that of one pose, and no foot is known to leave the ground")
     # At the clip's depth, since rigid limbs have one length whatever is drawn.
     known = [alignment.names.index(name) for name in lifted.names]

@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 from pegbar.io.exr import write_exr
 from pegbar.io.sequence import FrameSequence
 from pegbar.io.simulation_cache import DiskCache
+from pegbar.layer.reframe import reframe_picture
 from pegbar.scene.mesh import Mesh
 from pegbar.shot.drawn import drawn_inputs, read_drawn
+from pegbar.shot.framed import reframed_channels
 from pegbar.shot.layered import layered
 from pegbar.shot.model import SecondarySection
 from pegbar.shot.plan import Shot
@@ -92,8 +94,11 @@ class ElementsStage(Stage):
         final, *exr = self.outputs(frame)
         picture, notes = self._composite(frame, view)
         write_final(final, picture)
-        if exr:
+        film = self.shot.view(frame, view.size)
+        if exr and film is None:
             write_exr(exr[0], view.channels(), window=view.window)
+        elif exr and film is not None:
+            write_exr(exr[0], reframed_channels(view.channels(), film))
         return notes
 
     def picture(self, frame: int) -> NDArray[np.uint8]:
@@ -140,14 +145,13 @@ class ElementsStage(Stage):
         output = self.shot.settings.output
         drawn = [read_drawn(shot, frame) for shot in (self.shot, *self.layers.others)]
         for one in drawn:
-            if one.alpha.shape != view.size[::-1]:
-                height, width = one.alpha.shape
-                raise ValueError(
-                    f"frame {frame}: the drawing has {width} x {height} pixels, "
-                    f"the elements {view.size[0]} x {view.size[1]}"
-                )
+            if one.size != view.size:
+                sizes = [f"{width} x {height}" for width, height in (one.size, view.size)]
+                raise ValueError(f"frame {frame}: the drawing has {sizes[0]} pixels, the elements {sizes[1]}")
         dtype = np.float32 if output.is_exr else np.uint8
         picture = layered(view, drawn, (1.0, *self.layers.scales), output.composite_space, dtype)
+        film = self.shot.view(frame, view.size)
+        picture = picture if film is None else reframe_picture(picture, film)
         return picture, tuple(note for one in drawn for note in one.notes)
 
     def _recipe(self, frame: int) -> str:
@@ -159,4 +163,5 @@ class ElementsStage(Stage):
         for drawn in (shot, *layers.others):
             parts += [drawn.settings.drawing.model_dump(), drawn.matte]
             parts += [drawn.palette.colors.tolist(), drawn.palette.labels.tolist()]
+        parts += shot.framing(frame)
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()

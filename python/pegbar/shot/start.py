@@ -9,6 +9,7 @@ from pathlib import Path
 
 from pegbar.errors import MissingFrameError
 from pegbar.io.annotations import read_annotations
+from pegbar.io.camera_cells import camera_moves
 from pegbar.io.exposure import Exposure
 from pegbar.io.exposure_sheet import read_exposure_sheet
 from pegbar.io.frames import read_picture
@@ -200,6 +201,10 @@ def _with_sheet(text: str, folder: Path, exposure: Path, drawings: FrameSequence
     lines = f"exposure = {_quoted(path)}\n"
     if name is not None:
         lines += f"level = {_quoted(name)}   # of {', '.join(sheet.levels)}\n"
+    if camera_moves(sheet.camera, exposure.name)[0] is not None:
+        lines += (
+            'camera = "sheet"            # its moves are made; "drawn": the drawings are seen through them already\n'
+        )
     frames = list(Exposure.of_cells(sheet.level(name), sheet.first_frame).frames)
     text = re.sub(r'(?m)^frames = ".*"$', f'frames = "{format_frames(frames).replace(" ", "")}"', text, count=1)
     return re.sub(r"(?m)^# hold = 2 .*\n", lambda _: lines, text)
