@@ -194,7 +194,7 @@ def step_particles(
     ],
     capsules: _Doubles,
     facets: tuple[_Doubles, _Doubles, _Indices],
-    ground: tuple[float, list[tuple[tuple[float, float], float, bool, _Doubles]]],
+    ground: tuple[float, bool, list[tuple[tuple[float, float], float, bool, _Doubles]]],
     air: tuple[_Place, _Doubles, float],
     state: tuple[_Doubles, NDArray[np.int64]],
 ) -> _Doubles: ...

@@ -18,7 +18,7 @@ pub fn resample_view<'py>(
     let mut target = out.readwrite();
     let colors = grouped::<f32, [f32; 4], _>("picture", &picture)?;
     let pixels = bytemuck::cast_slice_mut(target.as_slice_mut()?);
-    py.detach(|| resample::resample(colors, width, &view, pixels, film)).map_err(to_python)?;
+    py.detach(|| resample::resample_rgba(colors, width, &view, pixels, film)).map_err(to_python)?;
     drop(target);
     Ok(out)
 }

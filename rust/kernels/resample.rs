@@ -76,8 +76,20 @@ fn keys(distance: f64) -> f64 {
     }
 }
 
-/// Writes film pixels `out`, rows of `film_width`, of `picture`, rows of `width`.
-pub fn resample<const C: usize>(
+/// Writes film pixels `out`, rows of `film_width`, of the premultiplied `picture`, rows of `width`.
+///
+/// Not generic, so that all of it is compiled together: three times as quick as from another crate.
+pub fn resample_rgba(
+    picture: &[[f32; 4]],
+    width: usize,
+    view: &View,
+    out: &mut [[f32; 4]],
+    film_width: usize,
+) -> Result<(), KernelError> {
+    resample(picture, width, view, out, film_width)
+}
+
+fn resample<const C: usize>(
     picture: &[[f32; C]],
     width: usize,
     view: &View,

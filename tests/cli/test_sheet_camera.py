@@ -88,6 +88,28 @@ def test_of_two_cameras_with_frames_of_one_size_the_one_that_fits_is_found(sampl
         assert tomllib.loads(whole.read_text())["passes"].get("camera", "drawn") == camera
 
 
+def test_a_camera_that_nothing_shows_is_a_guess(sample, capsys):
+    """Balls alone are in these passes, in a size that is a multiple of both."""
+    for frame in FRAMES:
+        passes = {"": np.zeros((180, 320, 4), np.float32), "Z": np.full((180, 320), np.inf, np.float32)}
+        passes[""][40:60, 50:70], passes["Z"][40:60, 50:70] = 1, 4
+        (sample.parent / "bare").mkdir(exist_ok=True)
+        write_exr(sample.parent / f"bare/r.{frame:04d}.exr", passes)
+    either = sample.with_name("either.toml")
+    either.write_text(sample.read_text().replace("size = [160, 90]\n", ""))
+    pattern = str(sample.parent / "bare/r.####.exr")
+    assert main(["import-passes", str(sample), pattern, "--check"]) == 0
+    assert "taken for" not in capsys.readouterr().out
+    for frame in FRAMES:
+        passes = {"": np.zeros((136, 240, 4), np.float32), "Z": np.full((136, 240), np.inf, np.float32)}
+        passes[""][40:60, 50:70], passes["Z"][40:60, 50:70] = 1, 4
+        write_exr(sample.parent / f"bare/r.{frame:04d}.exr", passes)
+    assert main(["import-passes", str(either), pattern, "--check"]) == 0
+    assert "taken for the exposure sheet's camera" in capsys.readouterr().out
+    assert main(["import-passes", str(either), pattern, "--check", "--camera", "drawn"]) == 0
+    assert "taken for" not in capsys.readouterr().out
+
+
 def test_secondary_frames_and_passes_are_what_the_camera_sees(sample, tmp_path):
     """Simulated and composited in the drawing's pixels, as without the sheet, and then seen."""
     still = sample.with_name("still.toml")

@@ -161,6 +161,7 @@ def test_check_names_every_bad_row_and_nothing_is_made(tmp_path, capsys):
     said = capsys.readouterr().err
     for row in ("sheet.csv:2: frame 1: pan_x", "sheet.csv:3: frame 2: zoom", "sheet.csv:4: frame 4: zoom"):
         assert row in said
+    assert said.count("correct that cell of the sheet") == 3
     with pytest.raises(ShotError, match="drawing.exposure: sheet.csv:2"):
         open_shot(shot)
     shot.write_text(shot.read_text().replace("[drawing]\n", '[drawing]\ncamera = "drawn"\n'))

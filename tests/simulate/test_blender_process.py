@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from pegbar.errors import BlenderError, MissingExtraError
+from pegbar.errors import BlenderError
 from pegbar.simulate.blender.locate import VARIABLE, Blender, find_blender
 from pegbar.simulate.blender.process import PATIENCE_VARIABLE, run_blender
 from tests.blenders import fake_blender
@@ -33,7 +33,7 @@ def run(folder: Path, body: str, **options: object) -> None:
 
 
 def test_no_blender_says_how_to_install_it() -> None:
-    with pytest.raises(MissingExtraError, match=r"pegbar\[blender\].*PATH.*PEGBAR_BLENDER"):
+    with pytest.raises(BlenderError, match=r"no Blender: install 3\.4 or later.*PATH.*pip install bpy.*PEGBAR_BLENDER"):
         find_blender()
 
 

@@ -72,12 +72,21 @@ def import_passes(
 
 
 def _judged(stages: Sequence[ImportStage]) -> tuple[ImportStage, list[Finding], Judgement | None]:
-    """The first of ``stages`` for whose camera the passes can be used, else the first; what was found; how to read."""
-    checked = [(stages[0], *stages[0].check())]
-    while checked[-1][2] is None and len(checked) < len(stages):
-        stage = stages[len(checked)]
-        checked.append((stage, *stage.check()))
-    return checked[-1] if checked[-1][2] is not None else checked[0]
+    """The first of ``stages`` whose camera rendered the passes, as far as that is seen; what was found; how to read."""
+    from pegbar.shot.incoming import Finding
+
+    checked = []
+    for stage in stages:
+        found, judgement = stage.check()
+        checked.append((stage, found, judgement))
+        if judgement is not None and any(line.what == "camera" and line.kind == "ok" for line in found):
+            return stage, found, judgement
+    usable = [check for check in checked if check[2] is not None]
+    stage, found, judgement = (usable or checked)[0]
+    if len(usable) > 1:
+        text = "taken for the exposure sheet's camera; the whole drawing's would fit as well"
+        found = [*found, Finding("guess", "camera", "some frames", text, "--camera drawn, if it is that one's")]
+    return stage, found, judgement
 
 
 def _stages(

@@ -145,14 +145,17 @@ class ElementsStage(Stage):
         output = self.shot.settings.output
         drawn = [read_drawn(shot, frame) for shot in (self.shot, *self.layers.others)]
         for one in drawn:
-            if one.size != view.size:
-                sizes = [f"{width} x {height}" for width, height in (one.size, view.size)]
-                raise ValueError(f"frame {frame}: the drawing has {sizes[0]} pixels, the elements {sizes[1]}")
+            if one.alpha.shape != view.size[::-1]:
+                height, width = one.alpha.shape
+                raise ValueError(
+                    f"frame {frame}: the drawing has {width} x {height} pixels, "
+                    f"the elements {view.size[0]} x {view.size[1]}"
+                )
         dtype = np.float32 if output.is_exr else np.uint8
         picture = layered(view, drawn, (1.0, *self.layers.scales), output.composite_space, dtype)
         film = self.shot.view(frame, view.size)
-        picture = picture if film is None else reframe_picture(picture, film)
-        return picture, tuple(note for one in drawn for note in one.notes)
+        seen = picture if film is None else reframe_picture(picture, film)
+        return seen, tuple(note for one in drawn for note in one.notes)
 
     def _recipe(self, frame: int) -> str:
         layers, shot = self.layers, self.shot

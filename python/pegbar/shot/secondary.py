@@ -63,7 +63,7 @@ class Secondary:
 
     @cached_property
     def blender(self) -> Blender:
-        """The Blender to use; MissingExtraError or BlenderError where there is none."""
+        """The Blender to use; BlenderError where there is none."""
         return find_blender(self.section.blender, folder=self.path.absolute().parent)
 
     @property

@@ -111,7 +111,7 @@ def _text(
     if annotations is not None:
         values["annotations"] = annotations.name
     elif found["dots"]:
-        values["annotations"] = "marks.json"
+        values["annotations"] = "annotation.json"
     taken = {Path(value).parent.as_posix() for value in values.values()}
     own = "depth" if "depth" not in taken else "drawing_depth"
     return f"""\
@@ -126,7 +126,7 @@ frames = {_quoted(_relative(drawings, folder))}
 {_line("labels", values)}
 {_line("annotations", values)}
 matte = "auto"               # auto, ink, unmix, fill or alpha
-# hold = 2                   # each drawing is shown for two frames
+# hold = 2                   # each drawing is shown for two frames; then take the line frames = ... above away
 # tolerance = 30             # limb colours that are scanned or antialiased
 
 # [drawing.palette]          # further colours and the limbs that they belong to

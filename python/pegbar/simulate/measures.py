@@ -68,7 +68,7 @@ def measure_cloth(
     edges = cloth_edges(cloth.triangles)
     rest = cloth.vertices if cloth.rest is None else cloth.rest
     lengths = np.maximum(np.linalg.norm(rest[edges[:, 0]] - rest[edges[:, 1]], axis=1), 1e-12)
-    return _Measuring(scene, cache, name, edges, lengths, _free(cloth.pins, len(rest))).over(frames)
+    return _Measuring(scene, cache, name, edges, lengths, free_of(cloth.pins, len(rest))).over(frames)
 
 
 def measure_strands(
@@ -94,8 +94,8 @@ def measure_strands(
     if not isinstance(strands, Strands):
         raise ValueError(f"name: {name!r} is no strands of the scene")
     links = strands.links
-    lengths, free = strands.link_lengths[links[:, 0]], _free(strands.pins, len(strands.points))
-    found = _Measuring(scene, cache, name, links, lengths, free, _to_pins(links, lengths, free)).over(frames)
+    lengths, free = strands.link_lengths[links[:, 0]], free_of(strands.pins, len(strands.points))
+    found = _Measuring(scene, cache, name, links, lengths, free, to_pins(links, lengths, free)).over(frames)
     starts = np.cumsum(strands.counts - 1) - (strands.counts - 1)
     grown = np.add.reduceat((1 + found.stretch) * lengths, starts, axis=1)
     return replace(found, stretch=grown / np.add.reduceat(lengths, starts) - 1)
@@ -204,14 +204,15 @@ def _deepest(points: Floats, rows: Floats, names: list[str], excused: Floats | f
     return float(-distance[deepest]), names[nearest[deepest]]
 
 
-def _free(pins: Sequence[Pin], count: int) -> NDArray[np.bool_]:
+def free_of(pins: Sequence[Pin], count: int) -> NDArray[np.bool_]:
+    """Which of ``count`` points (n,) no pin holds."""
     free = np.ones(count, bool)
     for pin in pins:
         free[slice(None) if pin.vertices is None else pin.vertices] = False
     return free
 
 
-def _to_pins(links: NDArray[np.int64], lengths: Floats, free: NDArray[np.bool_]) -> tuple[NDArray[np.int64], Floats]:
+def to_pins(links: NDArray[np.int64], lengths: Floats, free: NDArray[np.bool_]) -> tuple[NDArray[np.int64], Floats]:
     """By point the nearest pinned point along its strand and the metres to it, inf where there is none."""
     pins = np.flatnonzero(~free)
     if not len(pins):

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from pegbar.errors import BlenderError
 from pegbar.simulate.blender.bobs import are_alike
+from pegbar.simulate.blender.clearing import clear_of_volumes
 from pegbar.simulate.blender.cloth import cloth_entry, colliders
 from pegbar.simulate.blender.locate import Blender
 from pegbar.simulate.blender.particles import Tell, simulate_particles
@@ -104,7 +105,10 @@ class BlenderEngine:
             outputs = [folder / f"{name}.npz" for name in names.values()]
             run_blender(self.blender, INSIDE / "simulate.py", [place], outputs=outputs, progress=tell)
             for element, path in zip((*bodies, *cloths), outputs, strict=True):
-                store(scene, element, read_result(path, scene, element), cache, start)
+                result = read_result(path, scene, element)
+                if isinstance(element, Strands) and element.bobs is None:
+                    result["positions"] = clear_of_volumes(scene, element, result["positions"])
+                store(scene, element, result, cache, start)
 
     def _teller(self, scene: SimulationScene, progress: Progress | None, part: tuple[int, int]) -> Tell:
         """Return what is told of a part's steps, and tells of all frames."""

@@ -11,7 +11,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from pegbar.errors import BlenderError, MissingExtraError
+from pegbar.errors import BlenderError
 
 #: Names the Blender to use: an executable, or a Python that has bpy.
 VARIABLE = "PEGBAR_BLENDER"
@@ -64,10 +64,9 @@ def find_blender(setting: str | None = None, *, folder: str | Path = ".") -> Ble
 
     Raises
     ------
-    MissingExtraError
-        Where there is none; the message says how to install it.
     BlenderError
-        For one that is named and does not exist, is no Blender, is older than 3.4, or was built without what we need.
+        Where there is none (the message says how to install it), and for one that is named and does not exist, is no
+        Blender, is older than 3.4, or was built without what we need.
     """
     for named, base in ((setting, Path(folder)), (os.environ.get(VARIABLE), Path())):
         if named:
@@ -76,9 +75,10 @@ def find_blender(setting: str | None = None, *, folder: str | Path = ".") -> Ble
         return ask_version(sys.executable)
     if found := shutil.which("blender"):
         return ask_version(found)
-    here = "" if sys.version_info[:2] == (3, 11) else " in a Python 3.11"
-    otherwise = f"or put `blender` on PATH, or set {VARIABLE} to it or to a Python 3.11 that has bpy"
-    raise MissingExtraError("Blender", "blender", f"{here}, {otherwise}")
+    raise BlenderError(
+        "there is no Blender: install 3.4 or later (blender.org, or the distribution's) so that `blender` is on PATH, "
+        f"or the module bpy into a Python 3.11 of its own (pip install bpy), and set {VARIABLE} to executable or Python"
+    )
 
 
 def ask_version(program: str) -> Blender:
