@@ -56,7 +56,6 @@ def run() -> Iterator[Row]:
             rounds=9,
         )
         same = f"largest difference {error:.0e} of a unit, {len(clip.positions)} frames"
-        for name, time in (("BVH of 2 MB, positions of all joints", ours), ("the same as read_motion", motion)):
-            yield Row(
-                name, milliseconds(time), f"pybvh {milliseconds(peer)}", f"{peer / time:.1f}x", "promise 10x", same
-            )
+        rows = (("BVH of 2 MB, positions of all joints", ours, "promise 10x"), ("the same as read_motion", motion, ""))
+        for name, time, promise in rows:
+            yield Row(name, milliseconds(time), f"pybvh {milliseconds(peer)}", f"{peer / time:.1f}x", promise, same)
