@@ -2,7 +2,8 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use glam::DVec3;
-use pegbar_kernels::particles::{Nature, phase, step_particles};
+use pegbar_kernels::particle::phase;
+use pegbar_kernels::particles::{Nature, step_particles};
 use pegbar_kernels::surroundings::Surroundings;
 use std::f64::consts::TAU;
 
@@ -62,6 +63,7 @@ fn bench(c: &mut Criterion) {
         vertices: [&vertices, &vertices],
         triangles: &triangles,
         ground: 0.0,
+        absorbs: false,
         beds: &[],
         wind: DVec3::X,
         waves: &[wave; 4],

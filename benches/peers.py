@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 #: The comparisons, and the threads that each is stated for.
 THREADS = {
     **dict.fromkeys(("composite", "depth", "raster", "warp", "registration", "pose", "lift", "deform"), 1),
-    **dict.fromkeys(("batch", "motion", "match", "simulation", "animate"), 2),
+    **dict.fromkeys(("batch", "motion", "match", "simulation", "secondary", "animate"), 2),
 }
 
 

@@ -99,12 +99,21 @@ def call(command: list[str]) -> int:
 
 
 def fill_in(shot: Path) -> None:
-    """Do what the guide tells users to do with a new shot file: name further colours, and what is to be simulated."""
+    """Do what the guide tells users to do with a new shot file: name colours, and what is to be simulated."""
     text = shot.read_text(encoding="utf-8")
+    sample = tomllib.loads((shot.parents[1] / "demo/dots.toml").read_text(encoding="utf-8"))
+    dots, palette = sample["dots"], sample["drawing"]["palette"]
+    for color, joint in dots["joints"].items():
+        assert text.count(f'# "{color}" = "?"') == 1, color
+        text = text.replace(f'# "{color}" = "?"', f'"{color}" = "{joint}"')
+    for limb, color in dots["limbs"].items():
+        assert text.count(f'# ? = "{color}"') == 1, color
+        text = text.replace(f'# ? = "{color}"', f'{limb} = "{color}"')
     for line in ("[drawing.palette]", "[secondary]", 'elements = ["scarves", "skirt", "balls"]'):
         assert text.count(f"# {line}") == 1, line
         text = text.replace(f"# {line}", line)
-    text = text.replace('# "#8a4b2a" = "head"', '"#8a4a2b" = "head"\n"#e05050" = "torso"')
+    further = "\n".join(f'"{color}" = "{limb}"' for color, limb in palette.items())
+    text = text.replace('# "#8a4b2a" = "head"', further)
     shot.write_text(text, encoding="utf-8")
 
 
@@ -139,7 +148,7 @@ def make_workshop(folder: Path, data: Path) -> None:
     ``my_shot`` is what an artist has at first; clips and a painted character come from the real ``data``.
     """
     demo = folder / "demo"
-    for name in ("drawings", "labels", "passes"):
+    for name in ("drawings", "dots", "labels", "passes"):
         shutil.copytree(demo / name, folder / "my_shot" / name)
     for name in ("annotation.json", "clip.bvh"):
         shutil.copy2(demo / name, folder / "my_shot")

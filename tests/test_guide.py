@@ -32,8 +32,9 @@ def workshop(tmp_path_factory, test_data):
 
 @pytest.fixture
 def here(workshop, monkeypatch):
-    """The workshop as the working directory, its shot file as at first; nothing else that others read changes."""
+    """The workshop as the working directory, shot file and marks as at first; nothing else that others read changes."""
     shutil.copy(workshop / "shot.toml", workshop / "my_shot")
+    shutil.copy(workshop / "a.json", workshop / "my_shot/annotation.json")
     monkeypatch.chdir(workshop)
     return workshop
 

@@ -27,6 +27,7 @@ __all__ = [
     "limb_depth",
     "limb_depths",
     "matte",
+    "nearest_view",
     "over_ground",
     "own_alpha",
     "pack_gif_frames",
@@ -36,6 +37,7 @@ __all__ = [
     "pose_distance",
     "render_passes",
     "render_sheet",
+    "resample_view",
     "resolve_passes",
     "rim_depth",
     "search_clips",
@@ -135,6 +137,8 @@ def composite_matte(
     rendered_depth: NDArray[np.float32],
     scale: int,
 ) -> NDArray[np.float32]: ...
+def nearest_view(known: NDArray[np.uint8], view: list[float], size: list[int]) -> NDArray[np.int64]: ...
+def resample_view(picture: NDArray[np.float32], view: list[float], size: list[int]) -> NDArray[np.float32]: ...
 def rim_depth(rendered: NDArray[Any], rendered_depth: NDArray[np.float32]) -> NDArray[np.float32] | None: ...
 def parse_amc(path: str, text: bytes, bones: list[tuple[str, int]]) -> tuple[list[str], int, int, _Doubles]: ...
 def parse_bvh(
@@ -190,7 +194,7 @@ def step_particles(
     ],
     capsules: _Doubles,
     facets: tuple[_Doubles, _Doubles, _Indices],
-    ground: tuple[float, list[tuple[tuple[float, float], float, bool, _Doubles]]],
+    ground: tuple[float, bool, list[tuple[tuple[float, float], float, bool, _Doubles]]],
     air: tuple[_Place, _Doubles, float],
     state: tuple[_Doubles, NDArray[np.int64]],
 ) -> _Doubles: ...

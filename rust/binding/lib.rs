@@ -23,6 +23,7 @@ mod palette;
 mod particles;
 mod pose;
 mod raster;
+mod resample;
 mod rim;
 mod search;
 mod segment;
@@ -82,6 +83,8 @@ mod _kernels {
     use crate::pose::fit_poses;
     #[pymodule_export]
     use crate::raster::{render_passes, resolve_passes};
+    #[pymodule_export]
+    use crate::resample::{nearest_view, resample_view};
     #[pymodule_export]
     use crate::rim::rim_depth;
     #[pymodule_export]

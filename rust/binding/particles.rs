@@ -27,13 +27,13 @@ pub fn step_particles<'py>(
     behaviour: Behaviour,
     capsules: PyReadonlyArray3<'_, f64>,
     facets: Facets<'_>,
-    ground: (f64, Vec<Field<'_>>),
+    ground: (f64, bool, Vec<Field<'_>>),
     air: ([f64; 3], PyReadonlyArray2<'_, f64>, f64),
     mut state: State<'_>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let nature = nature(behaviour);
     let substeps = capsules.shape()[0].saturating_sub(1);
-    let beds: PyResult<Vec<Bed<'_>>> = ground.1.iter().map(bed).collect();
+    let beds: PyResult<Vec<Bed<'_>>> = ground.2.iter().map(bed).collect();
     let vertices: [&[DVec3]; 2] = [grouped("vertices", &facets.0)?, grouped("vertices", &facets.1)?];
     let around = Surroundings {
         capsules: grouped("capsules", &capsules)?,
@@ -41,6 +41,7 @@ pub fn step_particles<'py>(
         vertices,
         triangles: grouped("triangles", &facets.2)?,
         ground: ground.0,
+        absorbs: ground.1,
         beds: &beds?,
         wind: DVec3::from_array(air.0),
         waves: grouped("waves", &air.1)?,

@@ -5,26 +5,15 @@
 //! is a hash of a particle's serial number (splitmix64, Steele et al. 2014), so the same input gives the same bits for any
 //! number of threads.
 
+use crate::cells::Cells;
 use crate::chance::{chance, mix};
 use crate::error::{KernelError, check_length};
+use crate::particle::{Particle, phase};
+use crate::sine::sine;
 use crate::surroundings::{Surroundings, check, facets, swept};
-use crate::sweep::{Cells, Facet, Hit, Limb};
+use crate::sweep::{Bounds, Facet, Hit, Limb};
 use glam::DVec3;
 use rayon::prelude::*;
-
-/// What a slot holds.
-pub mod phase {
-    /// Nothing.
-    pub const FREE: i64 = 0;
-    /// A flake or drop in the air that has touched nothing.
-    pub const FALLING: i64 = 1;
-    /// A flake that lies on something.
-    pub const SETTLED: i64 = 2;
-    /// A droplet of a splash.
-    pub const DROPLET: i64 = 3;
-    /// What has touched something and runs or falls off it.
-    pub const SLIDING: i64 = 4;
-}
 
 /// The host of what lies on the ground or on nothing.
 const GROUND: i64 = -1;
@@ -36,34 +25,6 @@ const RUN: f64 = 0.15;
 const DROPLET_SIZE: f64 = 0.5;
 /// Deeper than this share of its radius in a limb a particle is gone: limbs that close leave no room for it.
 const CRUSHED: f64 = 0.5;
-
-/// One particle.
-#[derive(Debug, Clone, Copy)]
-struct Particle {
-    place: DVec3,
-    speed: DVec3,
-    radius: f64,
-    /// Seconds in its phase.
-    age: f64,
-    /// What chance hangs on.
-    serial: u64,
-    /// Index of the limb, then of the triangle that it lies on.
-    host: i64,
-    phase: i64,
-}
-
-impl Particle {
-    fn of(row: &[f64; 8], code: &[i64; 3]) -> Self {
-        let (place, speed) = (DVec3::new(row[0], row[1], row[2]), DVec3::new(row[3], row[4], row[5]));
-        let [serial, host, phase] = *code;
-        Particle { place, speed, radius: row[6], age: row[7], serial: serial as u64, host, phase }
-    }
-
-    fn rows(&self) -> ([f64; 8], [i64; 3]) {
-        let ([x, y, z], [u, v, w]) = (self.place.to_array(), self.speed.to_array());
-        ([x, y, z, u, v, w, self.radius, self.age], [self.serial as i64, self.host, self.phase])
-    }
-}
 
 /// How particles behave.
 #[derive(Debug, Clone, Copy)]
@@ -93,6 +54,7 @@ struct Now<'a> {
     nature: &'a Nature,
     around: &'a Surroundings<'a>,
     limbs: Vec<Limb>,
+    bounds: Bounds,
     facets: Vec<Facet>,
     cells: &'a Cells,
     time: f64,
@@ -129,9 +91,10 @@ pub fn step_particles(
     let mut events = vec![Event::None; particles.len()];
     for substep in 0..around.substeps {
         let (old, new) = (&around.capsules[substep * count..], &around.capsules[(substep + 1) * count..]);
-        let limbs = old.iter().zip(&new[..count]).map(|(old, new)| Limb::new(old, new)).collect();
+        let limbs: Vec<Limb> = old.iter().zip(&new[..count]).map(|(old, new)| Limb::new(old, new)).collect();
+        let bounds = Bounds::new(&new[..count], &limbs);
         let time = around.time + substep as f64 * nature.step;
-        let now = Now { nature, around, limbs, facets: facets(around, substep), cells: &cells, time };
+        let now = Now { nature, around, limbs, bounds, facets: facets(around, substep), cells: &cells, time };
         let pairs = particles.par_iter_mut().zip(events.par_iter_mut()).with_min_len(256);
         pairs.for_each(|(particle, event)| *event = now.advance(particle));
         settle_events(nature, &mut particles, &events, &mut landed);
@@ -247,7 +210,7 @@ impl Now<'_> {
         if speed > 0.0 && particle.phase == phase::FALLING {
             let turn = std::f64::consts::TAU * (rate * particle.age + chance(particle.serial, 11));
             let (tilt, other) = (chance(particle.serial, 12), 0.6 + 0.8 * chance(particle.serial, 13));
-            let sway = DVec3::new((turn + 6.0 * tilt).sin(), 0.0, (turn * other).sin());
+            let sway = DVec3::new(sine(turn + 6.0 * tilt), 0.0, sine(turn * other));
             air += speed * sway;
         }
         air
@@ -263,11 +226,16 @@ impl Now<'_> {
                 found = Some((hit, host));
             }
         };
-        for (index, limb) in self.limbs.iter().enumerate() {
-            keep(limb.meet(from, to, radius), index);
+        let (low, high) = (from.min(to), from.max(to));
+        if !self.bounds.off_the_way(low, high, radius) {
+            for (index, limb) in self.limbs.iter().enumerate() {
+                keep(limb.meet(from, to, radius), index);
+            }
         }
-        for index in self.cells.near(from.min(to) - radius, from.max(to) + radius) {
-            keep(self.facets[index as usize].meet(from, to, radius), self.limbs.len() + index as usize);
+        if self.cells.reach(low - radius, high + radius) {
+            for index in self.cells.near(low - radius, high + radius) {
+                keep(self.facets[index as usize].meet(from, to, radius), self.limbs.len() + index as usize);
+            }
         }
         found
     }
@@ -303,6 +271,9 @@ impl Now<'_> {
 
     /// Out of every limb; what finds no room is gone.
     fn push_out(&self, particle: &mut Particle) {
+        if self.bounds.are_off(particle.place, particle.place, particle.radius) {
+            return;
+        }
         for limb in &self.limbs {
             if limb.new.may_touch(particle.place, particle.radius) {
                 let near = limb.new.nearest(particle.place);
@@ -370,6 +341,7 @@ mod tests {
         vertices: [&[], &[]],
         triangles: &[],
         ground: 0.0,
+        absorbs: false,
         beds: &[],
         wind: DVec3::ZERO,
         waves: &[],

@@ -2,6 +2,7 @@
 //! on it, and the moving air.
 
 use crate::error::{KernelError, check_length};
+use crate::sine::sine;
 use crate::sweep::Facet;
 use glam::DVec3;
 
@@ -33,6 +34,8 @@ pub struct Surroundings<'a> {
     pub triangles: &'a [[u32; 3]],
     /// Height of the plane, -inf for none.
     pub ground: f64,
+    /// Whether flakes become part of it.
+    pub absorbs: bool,
     /// What lies on it.
     pub beds: &'a [Bed<'a>],
     /// The steady wind.
@@ -48,22 +51,25 @@ impl Surroundings<'_> {
     pub fn air(&self, place: DVec3, time: f64) -> DVec3 {
         let gust = |wave: &[f64; 8]| {
             let along = place.dot(DVec3::new(wave[3], wave[4], wave[5]));
-            (along - wave[6] * time + wave[7]).sin() * DVec3::new(wave[0], wave[1], wave[2])
+            sine(along - wave[6] * time + wave[7]) * DVec3::new(wave[0], wave[1], wave[2])
         };
         self.wind + self.waves.iter().map(gust).sum::<DVec3>()
     }
 
     /// Height of the ground under a place, and whether it takes flakes up.
     pub fn surface(&self, place: DVec3) -> (f64, bool) {
-        let mut found = (self.ground, false);
+        let (mut found, mut within) = ((f64::NEG_INFINITY, false), false);
         for bed in self.beds {
-            if let Some(height) = bed.height(place)
-                && height >= found.0
-            {
-                found = (height, bed.absorbs);
+            if let Some(height) = bed.height(place) {
+                within |= bed.absorbs;
+                if height >= found.0 {
+                    found = (height, bed.absorbs);
+                }
             }
         }
-        found
+        // Snow that is pressed lies lower than the plane of the snow around it.
+        let covered = within && self.absorbs;
+        if covered || found.0 >= self.ground { found } else { (self.ground, self.absorbs) }
     }
 }
 

@@ -91,6 +91,39 @@ impl Limb {
     }
 }
 
+/// The box around all limbs after a substep, and the farthest that a part of one has come in it.
+#[derive(Debug, Clone, Copy)]
+pub struct Bounds {
+    low: DVec3,
+    high: DVec3,
+    fastest: f64,
+}
+
+impl Bounds {
+    /// Of the rows after the substep, and the limbs made of them.
+    pub fn new(rows: &[[f64; 8]], limbs: &[Limb]) -> Self {
+        let fastest = limbs.iter().fold(0.0, |fastest: f64, limb| fastest.max(limb.fastest));
+        let ball = |row: &[f64; 8], k: usize| (DVec3::new(row[k], row[k + 1], row[k + 2]), row[k + 3]);
+        let balls = rows.iter().flat_map(|row| [ball(row, 0), ball(row, 4)]);
+        let (low, high) = balls.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), (center, radius)| {
+            (low.min(center - radius), high.max(center + radius))
+        });
+        Bounds { low, high, fastest }
+    }
+
+    /// Whether no limb comes within `margin` of any point of the box from `low` to `high`.
+    #[inline(always)]
+    pub fn are_off(&self, low: DVec3, high: DVec3, margin: f64) -> bool {
+        !(low.cmple(self.high + margin) & high.cmpge(self.low - margin)).all()
+    }
+
+    /// Whether nothing within `margin` of the way through the box from `low` to `high` can meet a limb in the substep.
+    #[inline(always)]
+    pub fn off_the_way(&self, low: DVec3, high: DVec3, margin: f64) -> bool {
+        self.are_off(low, high, margin + self.fastest + TOUCH)
+    }
+}
+
 /// A triangle before and after a substep.
 #[derive(Debug, Clone, Copy)]
 pub struct Facet {
@@ -156,61 +189,6 @@ fn at(corners: &[DVec3; 3], shares: DVec3) -> DVec3 {
     shares.x * corners[0] + shares.y * corners[1] + shares.z * corners[2]
 }
 
-/// Which triangles may be met where: cells of a grid over the boxes that they sweep.
-#[derive(Debug)]
-pub struct Cells {
-    low: DVec3,
-    size: f64,
-    counts: [usize; 3],
-    starts: Vec<u32>,
-    items: Vec<u32>,
-}
-
-impl Cells {
-    /// Of the boxes (low, high) of all triangles.
-    pub fn new(boxes: &[(DVec3, DVec3)]) -> Self {
-        let low = boxes.iter().fold(DVec3::INFINITY, |low, bounds| low.min(bounds.0));
-        let high = boxes.iter().fold(DVec3::NEG_INFINITY, |high, bounds| high.max(bounds.1));
-        if boxes.is_empty() || !(low.is_finite() && high.is_finite()) {
-            return Cells { low: DVec3::ZERO, size: 1.0, counts: [0; 3], starts: vec![0], items: Vec::new() };
-        }
-        let size = ((high - low).max_element() / 48.0).max(0.02);
-        let counts = ((high - low) / size).to_array().map(|count| count as usize + 1);
-        let mut cells = Cells { low, size, counts, starts: Vec::new(), items: Vec::new() };
-        let mut lists: Vec<Vec<u32>> = vec![Vec::new(); counts[0] * counts[1] * counts[2]];
-        for (index, bounds) in boxes.iter().enumerate() {
-            for cell in cells.of(bounds.0, bounds.1) {
-                lists[cell].push(index as u32);
-            }
-        }
-        cells.starts.push(0);
-        for list in lists {
-            cells.items.extend(list);
-            cells.starts.push(cells.items.len() as u32);
-        }
-        cells
-    }
-
-    /// The triangles that may lie in a box; one that lies in several cells comes several times.
-    pub fn near(&self, low: DVec3, high: DVec3) -> impl Iterator<Item = u32> + '_ {
-        self.of(low, high)
-            .flat_map(|cell| self.items[self.starts[cell] as usize..self.starts[cell + 1] as usize].iter().copied())
-    }
-
-    fn of(&self, low: DVec3, high: DVec3) -> impl Iterator<Item = usize> + 'static {
-        let counts = self.counts;
-        let first = ((low - self.low) / self.size).floor();
-        let last = ((high - self.low) / self.size).floor();
-        let range = move |from: f64, to: f64, count: usize| {
-            (from.max(0.0) as usize)..((to + 1.0).clamp(0.0, count as f64) as usize)
-        };
-        range(first.z, last.z, counts[2]).flat_map(move |z| {
-            range(first.y, last.y, counts[1])
-                .flat_map(move |y| range(first.x, last.x, counts[0]).map(move |x| (z * counts[1] + y) * counts[0] + x))
-        })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -261,13 +239,20 @@ mod tests {
     }
 
     #[test]
-    fn cells_give_every_triangle_whose_box_is_met() {
-        let boxes: Vec<_> = (0..10).map(|k| (DVec3::splat(f64::from(k)), DVec3::splat(f64::from(k) + 0.5))).collect();
-        let cells = Cells::new(&boxes);
-        let near = |at: f64| cells.near(DVec3::splat(at), DVec3::splat(at + 0.01)).any(|index| index == at as u32);
-        assert!((0..10).all(|k| near(f64::from(k) + 0.2)));
-        assert_eq!(cells.near(DVec3::splat(50.0), DVec3::splat(60.0)).count(), 0);
-        assert_eq!(cells.near(DVec3::splat(-9.0), DVec3::splat(-8.0)).count(), 0);
-        assert_eq!(Cells::new(&[]).near(DVec3::ZERO, DVec3::ONE).count(), 0);
+    fn no_path_that_meets_a_limb_is_off_its_bounds() {
+        let (old, new) = ([0.0, 0.0, 0.0, 0.3, 1.0, 0.5, 0.0, 0.1], [0.2, 0.4, 0.1, 0.25, 1.1, 0.1, 0.3, 0.15]);
+        let limb = Limb::new(&old, &new);
+        let bounds = Bounds::new(&[new], &[limb]);
+        let at = |k: i32, step: f64| (f64::from(k) * step).rem_euclid(4.0) - 1.5;
+        let mut met = [0, 0];
+        for k in 0..4000 {
+            let from = DVec3::new(at(k, 0.618), at(k, 1.414), at(k, 2.732));
+            let to = from + DVec3::new(at(k, 3.3), at(k, 0.7), at(k, 1.9)) * 0.3;
+            let off = bounds.off_the_way(from.min(to), from.max(to), 0.02);
+            let hit = limb.meet(from, to, 0.02).is_some();
+            assert!(!(off && hit), "{from} {to}");
+            met[usize::from(hit)] += usize::from(!off || hit);
+        }
+        assert!(met[1] > 100 && met[0] < 2000, "{met:?}");
     }
 }

@@ -99,6 +99,20 @@ def test_init_takes_the_marks_frame_rate_or_leaves_it_open(tmp_path):
         assert f"\n{line}" in (tmp_path / "shot.toml").read_text()
 
 
+def test_check_notes_held_drawings_that_no_frame_shows(tmp_path, capsys):
+    shot = make_shot(tmp_path)
+    text = shot.read_text()
+    shot.write_text(text.replace("[drawing]", "[drawing]\nhold = 2"))
+    assert run("check", shot) == 0
+    told = capsys.readouterr().err
+    assert f"{shot}:2: shot.frames: drawings 3-4 are shown in no frame: each is held for 2 of frames 1-4 -> " in told
+    # Without a hold a part of the drawings may be meant, and without frames all are shown.
+    for changed in (text.replace('"1-4"', '"1-2"'), text.replace('frames = "1-4"\n', "")):
+        shot.write_text(changed)
+        assert run("check", shot) == 0
+        assert capsys.readouterr().err == ""
+
+
 def test_init_says_what_it_cannot_find(tmp_path, capsys):
     assert run("init", tmp_path / "none") == 2
     assert run("init", tmp_path) == 2
@@ -297,7 +311,7 @@ def test_init_finds_dots_and_says_where_each_colour_is(tmp_path, capsys):
     text = text.replace('# "#008000" = "?"', '"#008000" = "left_elbow"').replace("# ? = ", "left_forearm = ")
     shot.write_text(text)
     assert run("dots", shot) == 0
-    drawing = read_annotations(tmp_path / "marks.json")
+    drawing = read_annotations(tmp_path / "annotation.json")
     assert drawing.names == ("left_hand", "left_elbow")
     np.testing.assert_allclose(drawing.markers[1], [[12, 20], [30, 8]], atol=0.5)
     assert drawing.limbs[0].color == (0, 0, 255)

@@ -8,6 +8,7 @@ import pytest
 
 from pegbar.cli.main import main
 from pegbar.io.hold import BusyError, hold
+from pegbar.sample.shot import write_sample
 from tests.cli.interruptions import contents, start, wait_for
 from tests.cli.pipeline import kill_and_compare, write_shot
 from tests.shots import make_shot
@@ -127,6 +128,22 @@ def test_a_second_run_of_frames_says_so_and_goes_on(shot, undisturbed, holder, c
     assert f"final: another pegbar is at work here (process {first.pid} on" in lines[0]
     assert lines[0].endswith("frames may be made twice")
     assert contents(shot.parent / "final") == undisturbed[1]
+
+
+def test_a_second_export_or_import_says_so_and_stops(tmp_path, holder, capsys):
+    shot = write_sample(tmp_path, size=(128, 72), frames=2, samples=1)
+    passes = str(tmp_path / "passes/passes.####.exr")
+    before = shot.read_text()
+    for arguments, folder in ((["export", str(shot)], "export"), (["import-passes", str(shot), passes], "imported")):
+        first = holder(tmp_path / folder)
+        assert main(arguments) == 2
+        assert f"{folder}: another pegbar is at work here (process {first.pid} on" in capsys.readouterr().err
+        assert {path.name for path in (tmp_path / folder).rglob("*") if path.is_file()} <= {"run.lock"}
+        assert shot.read_text() == before
+        first.kill()
+        first.wait()
+        assert main(arguments) == 0
+        before = shot.read_text()
 
 
 def test_a_second_run_of_a_stage_says_so_and_stops(tmp_path, holder, capsys):

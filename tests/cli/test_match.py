@@ -176,11 +176,25 @@ def test_the_second_search_reads_no_clip(tmp_path, clips, capsys, monkeypatch):
 
 def test_a_picture_that_is_missing_leaves_the_sheet_with_the_marks(tmp_path, clips, capsys):
     marks = annotate(tmp_path / "a.json", drawn(dance_clip(), 40, 12, 60), pictures=True)
-    (tmp_path / "d.0001.png").unlink()
+    for path in tmp_path.glob("d.*.png"):
+        path.unlink()
     code, _, err = run(capsys, marks, clips, "-o", "out")
     assert code == 0
-    assert "warning:" in err
+    # Once, however many there are.
+    first = f"{tmp_path / 'd.0001.png'}: no such file or directory (and so 5 more)"
+    assert err == f"pegbar: warning: {first}: the sheet shows these marks without pictures\n"
     assert (tmp_path / "out" / "match.png").stat().st_size > 0
+
+
+def test_marks_from_another_folder_are_shown_on_the_shots_drawings(tmp_path, clips, capsys):
+    marks = annotate(tmp_path / "a.json", drawn(dance_clip(), 40, 12, 60), pictures=True)
+    marks.write_text(marks.read_text().replace('"d.0', '"../gone/d.0'))
+    shot = tmp_path / "shot.toml"
+    shot.write_text(SHOT)
+    code, _, err = run(capsys, marks, clips, "-o", "out", "--write", shot)
+    assert (code, err) == (0, "")
+    # The drawings' light grey.
+    assert (cv2.imread(str(tmp_path / "out" / "match.png")) == 240).all(axis=2).sum() > 10_000
 
 
 def test_drawings_are_counted_as_their_files_are(tmp_path, clips, capsys):

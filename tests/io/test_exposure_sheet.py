@@ -86,7 +86,7 @@ def test_clip_studio_s_ticks_hold_and_negative_frames_begin(tmp_path):
     sheet = read_exposure_sheet(xdts(tmp_path, CLIP_STUDIO))
     assert sheet.level("A") == (1, 1, 1, 1, 2, 2, 2, 2)
     assert sheet.level("BG") == (7,) * 10
-    assert sheet.camera == ("PAN",)
+    assert (sheet.camera, sheet.instructions) == ((), ("PAN",))
     with pytest.raises(ValueError, match="several levels, name one: A, BG"):
         sheet.level()
     with pytest.raises(ValueError, match="no level 'C'"):
@@ -106,7 +106,9 @@ def test_hand_written_sheets(tmp_path, text, expected):
     sheet = read_exposure_sheet(written(tmp_path, text))
     assert sheet.level() == expected
     assert sheet.first_frame == 1
-    assert sheet.camera == (("pan_x",) if "pan_x" in text else ())
+    assert [(cell.frame, cell.column, cell.text) for cell in sheet.camera] == (
+        [(1, "pan_x", "0"), (2, "pan_x", "5"), (3, "pan_x", "10")] if "pan_x" in text else []
+    )
 
 
 @pytest.mark.parametrize(

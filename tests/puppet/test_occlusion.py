@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pegbar.puppet.occlusion import HYSTERESIS, Pieces, nearest_points, piece_ranks, settle
+from pegbar.puppet.occlusion import BRIEF, HYSTERESIS, Pieces, calmed, nearest_points, piece_ranks, settle
 from tests.puppets import camera
 
 BONES = np.array([[0, 1], [2, 3]])
@@ -104,3 +104,45 @@ def test_where_a_limb_hangs_on_another_layer_the_order_stays_as_drawn(layers, ra
     coat_and_thigh = Pieces(np.arange(2), np.array([1, 2]), np.array(layers)[1:], np.full(2, 50.0), np.zeros(2, int))
     found = piece_ranks(coat_and_thigh, bones, camera(), poses)
     assert found.tolist() == [ranks, ranks]
+
+
+def flags(text):
+    return np.array([[letter == "1"] for letter in text])
+
+
+def calm(shown, front=None, touching=None):
+    """`calmed` of one pair, its flags as text; ``front`` is another order throughout where it is not given."""
+    shown = flags(shown)
+    touching = np.ones(shown.shape, bool) if touching is None else flags(touching)
+    made = calmed(shown, ~shown if front is None else flags(front), touching)
+    return "".join("1" if flag else "0" for flag in made[:, 0])
+
+
+def test_a_change_that_is_undone_at_once_is_none():
+    assert calm("000110000000") == "000000000000"
+    assert calm("111101011111") == "111111111111"
+    # What lasts stays, and so does what the clip begins or ends with.
+    assert BRIEF == 3
+    assert calm("000111000000") == "000000000000"
+    assert calm("000111100000") == "000111100000"
+    assert calm("011111111110") == "011111111110"
+
+
+def test_two_limbs_own_changes_stay_however_brief():
+    assert calm("000110000", front="000110000") == "000110000"
+    assert calm("000110000", front="000100000") == "000000000"
+    assert calm("000110000", front="111110000") == "000000000"
+
+
+def test_a_hand_that_flies_past_a_face_is_in_front_of_it_though_briefly():
+    # They cover each other only there: before and after nobody sees which is nearer.
+    assert calm("000110000", touching="000110000") == "000110000"
+    assert calm("000110000", touching="001111000") == "000000000"
+
+
+def test_each_pair_is_calmed_by_itself_and_the_input_stays():
+    shown = np.concatenate([flags("0001000"), flags("0111100"), flags("1011111")], axis=1)
+    before = shown.copy()
+    made = calmed(shown, ~shown, np.ones(shown.shape, bool))
+    np.testing.assert_array_equal(made, np.concatenate([flags("0000000"), flags("0111100"), flags("1111111")], axis=1))
+    np.testing.assert_array_equal(shown, before)

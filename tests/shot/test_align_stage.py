@@ -173,6 +173,9 @@ def test_the_report_has_a_section_for_each_stage_that_has_run(made, capsys):
     assert text.count("data:image/png;base64,") in (3, 4)  # 4 after a test has made a depth picture
     assert "Out of date" not in text
     assert complaints(page) == []
+    # Whoever gets the page learns nothing of this machine's folders, and what is good.
+    assert str(made.parent) not in page.read_text()
+    assert "good: up to 10% of the height" in page.read_text()
     settings = made.read_text()
     made.write_text(settings + "\n[align]\nsmoothing = 3\n")
     assert main(["report", str(made), "-o", str(page)]) == 0

@@ -145,3 +145,14 @@ def test_marks_say_how_fast_the_drawings_run_as_far_as_the_shot_does(tmp_path, l
     shot.write_text("[shot]\nframe_rate = 30\n" + text)
     assert main(["dots", str(shot)]) == 0
     assert read_annotations(tmp_path / "marks.json").frame_rate == 30
+
+
+def test_limbs_with_an_end_that_no_dot_shows_name_that_joint(tmp_path, capsys):
+    make(tmp_path)
+    shot = tmp_path / "shot.toml"
+    text = re.sub(r', "#\w+" = "right_hip"', "", shot.read_text())
+    assert text != shot.read_text()
+    shot.write_text(text + 'limbs = { right_thigh = "#0000ff" }\n')
+    assert main(["dots", str(shot)]) == 2
+    told = "no limb right_thigh between joints that have dots: dot right_hip too, at least once, where it would be"
+    assert f"dots.limbs: {told} (or leave the limb out)\n" in capsys.readouterr().err

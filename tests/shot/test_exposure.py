@@ -60,9 +60,13 @@ def test_init_puts_the_sheet_into_the_shot_file(tmp_path, capsys):
     sheet.write_text("frame,B,d,pan_x\n1,9,1,0\n3,9,3,20\n5,x,x,40\n")
     arguments = ["init", str(tmp_path / "shot"), "--drawings", "d.####.png", "--exposure", str(sheet), "--overwrite"]
     assert main(arguments) == 0
-    assert "camera moves are not used (pan_x)" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "the sheet moves the camera (pan_x): finished frames are what it sees" in said
+    assert "in words" not in said
     table = tomllib.loads((tmp_path / "shot/shot.toml").read_text())
     assert (table["drawing"]["exposure"], table["drawing"]["level"]) == ("../sheet.csv", "d")
+    assert table["drawing"]["camera"] == "sheet"
     assert table["shot"]["frames"] == "1-4"
     plan = open_shot(tmp_path / "shot/shot.toml")
     assert [plan.exposure.drawing(frame) for frame in plan.frames] == [1, 1, 3, 3]
+    assert [plan.moves.at(frame)["pan_x"] for frame in plan.frames] == [0, 10, 20, 30]

@@ -107,8 +107,9 @@ def test_what_cannot_be_lifted_is_named(drawn):
             for key in ("times", "clip", "matrices", "markers", "estimated", "grounded", "positions", "errors")
         },
     )
-    with pytest.raises(ValueError, match="2 or more"):
-        lift_drawing(one, clip, 24, LiftOptions())
+    assert len(lift_drawing(one, clip, 24, LiftOptions()).motion.positions) == 1
+    with pytest.raises(ValueError, match=r"lift\.loop: want 3 drawings with marks or more to close a loop, got 1"):
+        lift_drawing(one, clip, 24, LiftOptions(loop=True))
     points = Motion(NAMES, (-1,) * 6, clip.markers(NAMES), np.tile(np.eye(3), (FRAMES, 6, 1, 1)), 24.0)
     with pytest.raises(ValueError, match=r"clip: it has points and no skeleton.*lift\.skeleton"):
         lift_drawing(alignment, points, 24, LiftOptions())

@@ -98,3 +98,13 @@ def test_a_warp_finds_the_drawings_in_the_clip_or_says_that_it_is_too_short(walk
     assert np.abs(drawn.warped(seen, moments) - columns).max() < 2 * FINE
     with pytest.raises(ValueError, match="frames 0 to 18 are too few for 60 drawings"):
         drawn.warped(seen[: 18 * FINE + 1], moments[: 18 * FINE + 1])
+
+
+@pytest.mark.parametrize("poses", [1, 4, 999, 2000, 2001, 4000, 4001, 8000, 8001, 10_000, 100_003])
+def test_what_is_compared_is_bounded_and_what_is_shown_is_among_it(poses):
+    spread, (rows, columns) = retiming._thinned(2500, poses)
+    assert -(-poses // spread) <= 2000
+    assert FINE * columns % spread == 0
+    assert -(-poses // (FINE * columns)) <= 1000
+    assert rows == 3
+    assert poses > 2000 or (spread, columns) == (1, 1)

@@ -65,7 +65,10 @@ def test_a_pin_to_a_marker_that_is_never_there_is_refused_and_gaps_are_filled():
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: Pin("tail", "x"), "kind: want one of marker, limb, world"),
+        (lambda: Pin("tail", "x"), "kind: want one of marker, limb, path, world"),
+        (lambda: Pin("path"), "path: want one for the kind 'path', and for no other, got 'path'"),
+        (lambda: Pin("world", path=np.zeros((2, 3, 4))), "path: want one for the kind 'path'.*got 'world'"),
+        (lambda: Pin("path", path=np.zeros((2, 4, 4))), "path: want shape"),
         (lambda: Pin("limb"), "target: a pin to a limb wants its name"),
         (lambda: flag(Pin("world", vertices=np.array([3]))), "pins: flag: vertex 3 is not one of 3"),
         (lambda: Cloth("c", np.eye(3), np.array([[0, 1, 3]])), "triangles: want values in 0..2"),

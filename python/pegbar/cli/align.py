@@ -45,7 +45,8 @@ def align(
         print(f"pegbar: {line}", file=sys.stderr)
     print(f"align: {summary(alignment)}")
     where = os.path.relpath(stage.folder)
-    print(f"align: {len(stage.numbers)} drawings {'aligned' if made else 'up to date'}, in {where}")
+    count = len(stage.numbers)
+    print(f"align: {count} drawing{'' if count == 1 else 's'} {'aligned' if made else 'up to date'}, in {where}")
     return 0
 
 

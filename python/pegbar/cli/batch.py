@@ -117,5 +117,6 @@ def progress(name: str, total: int) -> Iterator[Callable[[], None]]:
 
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(name, total=total)
-        yield lambda: bar.advance(task)
+        # It moves to and fro until the first step: what is worked out for all of them may take long.
+        task = bar.add_task(name, total=None)
+        yield lambda: bar.update(task, total=total, advance=1)

@@ -40,7 +40,7 @@ def check(
         print(json.dumps({"frames_read": read, "problems": [problem.record() for problem in problems]}, indent=1))
     else:
         _print(problems)
-        print(f"check: {read} frames read, {wrong or 'no'} problem{'' if wrong == 1 else 's'}")
+        print(f"check: {read} frame{'' if read == 1 else 's'} read, {wrong or 'no'} problem{'' if wrong == 1 else 's'}")
     return 1 if wrong else 0
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -70,7 +71,7 @@ def _make(folder: Path, length: int, jobs: int | None) -> int:
 
 _LEAD = (
     "A dancer, drawn frame by frame with her joints marked, and a clip of the dance. This page shows what pegbar makes "
-    "of the two; every command that made it works on your own shot."
+    "of the two; every command that made it works on your own shot. A click on a picture opens it in full size."
 )
 _MADE = {
     "secondary/animation.png": "scarves, a skirt and balls that collide with the drawn dancer",
@@ -124,54 +125,17 @@ def _animate(folder: Path) -> None:
 
 
 def _sections(folder: Path) -> list[Section]:
-    """The three jobs, and what they begin with; those that have run."""
-    from pegbar.report.page import Picture, Section
+    """The three jobs, what they begin with, and how to go on; those that have run."""
+    from pegbar.cli.demo_page import demo_sections, next_step
 
-    found = [
-        Section(
-            "What the artist gives",
-            ("Drawings with marked joints and limb colours, and a motion-capture clip.",),
-            files=(("annotation.json", "joint marks"), ("clip.bvh", "the clip"), ("shot.toml", "the shot file")),
-            pictures=(Picture("drawings/dancer.0001.png", "a drawing"), Picture("labels/labels.0001.png", "its limbs")),
-        ),
-        Section(
-            "1. Secondary motion",
-            ("pegbar secondary: cloth and balls collide with the drawn limbs, in right depth order.",),
-            files=(("secondary/report.json", "penetration, stretch, seconds"),),
-            pictures=(
-                Picture("secondary/animation.png", "scarves, skirt and balls, simulated by pegbar"),
-                Picture("animation.png", "pegbar composite: hoop and ribbon rendered elsewhere"),
-                Picture("secondary/volumes.png", "limb boxes and collision volumes", wide=True),
-                Picture("contact_sheet.png", "drawing, depth, composite", wide=True),
-            ),
-        ),
-        Section(
-            "2. Lifted to 3D",
-            ("pegbar lift: the artist's poses and timing on a 3D skeleton.",),
-            files=(
-                ("lift/animation.glb", "glTF, opens in viewers, Blender and engines"),
-                ("lift/animation.bvh", "BVH"),
-                ("lift/report.json", "figures"),
-            ),
-            pictures=(
-                Picture("lift/preview.gif", "drawing, overlay and turntable", wide=True),
-                Picture("align/sheet.png", "clip and drawing, aligned", wide=True),
-            ),
-        ),
-        Section(
-            "3. One picture, animated",
-            ("pegbar animate: a single drawing performs the clip.",),
-            pictures=(Picture("animated.gif", "made of the first drawing alone"),),
-        ),
-    ]
-    return [part for section in found if (part := _there(section, folder)).pictures]
+    return [*(part for section in demo_sections() if (part := _there(section, folder)).pictures), next_step()]
 
 
 def _there(section: Section, folder: Path) -> Section:
     """The section without what was not made."""
     pictures = tuple(picture for picture in section.pictures if (folder / picture.source).is_file())
     files = tuple(entry for entry in section.files if (folder / entry[0]).is_file())
-    return type(section)(section.title, section.words, files=files, pictures=pictures)
+    return replace(section, files=files, pictures=pictures)
 
 
 def _rows(shot: Shot, frame: int) -> Iterator[NDArray[np.uint8]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -36,6 +37,9 @@ def import_passes(
     alpha: Annotated[
         Literal["premultiplied", "straight"] | None, Parameter(help="What alpha is (default: found out).")
     ] = None,
+    camera: Annotated[
+        Literal["sheet", "drawn"] | None, Parameter(help="Which export it was rendered for (default: found out).")
+    ] = None,
     check: Annotated[bool, Parameter(negative="", help="Only check; write nothing.")] = False,
 ) -> int:
     """Check and take passes that another package rendered; see `pegbar import-passes --help`.
@@ -55,9 +59,11 @@ def import_passes(
     if unit is not None and unit not in UNITS:
         raise ValueError(f"--unit: want one of {', '.join(UNITS)}, got {unit}")
     options = ImportOptions(depth, UNITS[unit] if unit else None, alpha)
-    stage = _stage(shot, passes, (shift, layer), frames, output, options)
-    target = stage.outputs
-    found, judgement = stage.check()
+    stages = _stages(shot, passes, (shift, layer), frames, output, options)
+    if camera is not None:
+        stages = [stage for stage in stages if stage.camera == camera] or stages
+    target = stages[0].outputs
+    stage, found, judgement = _judged(stages)
     print_table(found)
     if judgement is None:
         print("pegbar: the passes cannot be used as they are; nothing is written", file=sys.stderr)
@@ -65,25 +71,47 @@ def import_passes(
     return 0 if check else _take(shot, stage, judgement, target)
 
 
-def _stage(
+def _judged(stages: Sequence[ImportStage]) -> tuple[ImportStage, list[Finding], Judgement | None]:
+    """The first of ``stages`` whose camera rendered the passes, as far as that is seen; what was found; how to read."""
+    from pegbar.shot.incoming import Finding
+
+    checked = []
+    for stage in stages:
+        found, judgement = stage.check()
+        checked.append((stage, found, judgement))
+        if judgement is not None and any(line.what == "camera" and line.kind == "ok" for line in found):
+            return stage, found, judgement
+    usable = [check for check in checked if check[2] is not None]
+    stage, found, judgement = (usable or checked)[0]
+    if len(usable) > 1:
+        text = "taken for the exposure sheet's camera; the whole drawing's would fit as well"
+        found = [*found, Finding("guess", "camera", "some frames", text, "--camera drawn, if it is that one's")]
+    return stage, found, judgement
+
+
+def _stages(
     shot: Path,
     passes: Sequence[str],
     found: tuple[int, str | None],
     frames: str | None,
     output: Path | None,
     options: ImportOptions,
-) -> ImportStage:
+) -> list[ImportStage]:
+    """For the camera of the exposure sheet, where it moves, and for that of the drawings."""
     from pegbar.shot.import_stage import ImportStage
     from pegbar.shot.incoming import Incoming
     from pegbar.shot.plan import open_shot
-    from pegbar.shot.shot_scene import Tracked, shot_scene
+    from pegbar.shot.shot_scene import Tracked, film_scene, shot_scene
 
     incoming = Incoming.find(passes, *found)
     wanted = BatchOptions(frames=frames).select(open_shot(shot, aligned=False).frames)
     beside = shot.absolute().parent
+    tracked = Tracked(shot, False, beside / "export")
     with bars() as tell:
-        scene, _ = shot_scene(Tracked(shot, False, beside / "export"), tell)
-    return ImportStage(incoming, tuple(wanted), scene, output or beside / "imported", options)
+        scene, _ = shot_scene(tracked, tell)
+    drawn = ImportStage(incoming, tuple(wanted), scene, output or beside / "imported", options)
+    seen = film_scene(scene, tracked)
+    return [replace(drawn, scene=seen, camera="sheet"), drawn] if seen.views else [drawn]
 
 
 def _take(shot: Path, stage: ImportStage, judgement: Judgement, target: FrameSequence) -> int:
@@ -91,9 +119,10 @@ def _take(shot: Path, stage: ImportStage, judgement: Judgement, target: FrameSeq
 
     with progress("import", len(stage.frames)) as advance:
         stage.run(judgement, advance)
-    section = write_passes(shot, Path(target.pattern))
-    print(f"import-passes: {len(stage.frames)} frames written, {os.path.relpath(target.pattern)}")
-    print(f"import-passes: {os.path.relpath(shot)} says now: {section.splitlines()[1]}")
+    section = write_passes(shot, Path(target.pattern), stage.camera)
+    count = len(stage.frames)
+    print(f"import-passes: {count} frame{'' if count == 1 else 's'} written, {os.path.relpath(target.pattern)}")
+    print(f"import-passes: {os.path.relpath(shot)} says now: {', '.join(section.splitlines()[1:])}")
     return 0
 
 

@@ -27,7 +27,6 @@ def init(
         The folder with the drawn frames.
     """
     from pegbar.io.atomic import complete_file
-    from pegbar.io.exposure_sheet import read_exposure_sheet
     from pegbar.shot.start import start_shot
 
     if not folder.is_dir():
@@ -38,7 +37,21 @@ def init(
     text = start_shot(folder, drawings, exposure)
     with complete_file(target) as part:
         part.write_text(text, encoding="utf-8")
-    if exposure is not None and (moves := read_exposure_sheet(exposure).camera):
-        print(f"init: the sheet's camera moves are not used ({', '.join(moves)}): pegbar align finds the camera")
+    if exposure is not None:
+        _tell_of_camera(exposure)
     print(f"init: wrote {target}; look it over, then run: pegbar check {target}")
     return 0
+
+
+def _tell_of_camera(exposure: Path) -> None:
+    from pegbar.io.exposure_sheet import read_exposure_sheet
+
+    sheet = read_exposure_sheet(exposure)
+    if sheet.camera:
+        columns = ", ".join(dict.fromkeys(cell.column for cell in sheet.camera))
+        print(
+            f"init: the sheet moves the camera ({columns}): finished frames are what it sees of the drawings; if these "
+            'are seen through it already, write drawing.camera = "drawn"'
+        )
+    if sheet.instructions:
+        print(f"init: camera work in words is not used ({', '.join(sheet.instructions)}): write it as numbers")

@@ -75,7 +75,7 @@ def match(
     words = timing.words(found.matches[0].drawing_rate) if found.matches else ""
     report_matches(folder, found, words, [_numbers(drawing)[place] for place in chosen])
     if output is not None and found.matches:
-        _write_sheet(output, drawing, chosen, folder, found)
+        _write_sheet(output, drawing, chosen, folder, found, write)
     _write_choice(write, clips, found, timing)
     return 0
 
@@ -124,7 +124,9 @@ def _search(drawing: Drawing, chosen: list[int], folder: ClipFolder, timing: Tim
     )
 
 
-def _write_sheet(output: Path, drawing: Drawing, chosen: list[int], folder: ClipFolder, found: Matches) -> None:
+def _write_sheet(
+    output: Path, drawing: Drawing, chosen: list[int], folder: ClipFolder, found: Matches, shot: Path | None
+) -> None:
     # Pictures take long to import, and the table does without.
     import numpy as np
 
@@ -146,21 +148,43 @@ def _write_sheet(output: Path, drawing: Drawing, chosen: list[int], folder: Clip
         captions = tuple(f"clip frame {match.times[key]:.1f}" for key in keys)
         rows.append(SheetRow(describe_match(rank, match, clips[match.clip]), points, captions))
     titles = [f"drawing {_numbers(drawing)[place]}" for place in shown]
-    sheet = match_sheet(marks, titles, [_picture(drawing, place) for place in shown], rows)
+    sheet = match_sheet(marks, titles, _pictures(drawing, shown, shot), rows)
     output.mkdir(parents=True, exist_ok=True)
     write_image(output / "match.png", sheet)
     print(f"match: wrote {output / 'match.png'}")
 
 
-def _picture(drawing: Drawing, place: int) -> NDArray[np.uint8] | None:
-    """The drawing's picture where there is one to be read; the sheet does without."""
+def _pictures(drawing: Drawing, places: list[int], shot: Path | None) -> list[NDArray[np.uint8] | None]:
+    """The drawings' pictures: those that the marks name, else the shot's of that name; the sheet does without."""
     from pegbar.io.frames import read_picture
 
-    try:
-        return read_picture(drawing.images[place]) if drawing.images else None
-    except (OSError, ValueError) as error:
-        print(f"pegbar: warning: {describe(error)}", file=sys.stderr)
-        return None
+    if not drawing.images:
+        return [None] * len(places)
+    known = _shot_pictures(shot)
+    found: list[NDArray[np.uint8] | None] = []
+    problems = []
+    for place in places:
+        named = drawing.images[place]
+        try:
+            found.append(read_picture(named if named.is_file() else known.get(named.name, named)))
+        except (OSError, ValueError) as error:
+            found.append(None)
+            problems.append(describe(error))
+    if problems:
+        more = f" (and so {len(problems) - 1} more)" if problems[1:] else ""
+        print(f"pegbar: warning: {problems[0]}{more}: the sheet shows these marks without pictures", file=sys.stderr)
+    return found
+
+
+def _shot_pictures(shot: Path | None) -> dict[str, Path]:
+    """The shot's drawings by their files' names, for marks that came from another folder."""
+    if shot is None:
+        return {}
+    from pegbar.io.sequence import FrameSequence
+    from pegbar.shot.load import load_shot
+
+    drawings = FrameSequence.parse(shot.parent / load_shot(shot).drawing.frames)
+    return {path.name: path for path in map(drawings.path, drawings.numbers)}
 
 
 def _write_choice(shot: Path | None, clips: Path, found: Matches, timing: Timing) -> None:

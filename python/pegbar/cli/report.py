@@ -37,7 +37,10 @@ def report(
         print(f"pegbar: note: no stage of this shot has run yet: run {first} first", file=sys.stderr)
     page = output or found.folder / "report.html"
     name = found.settings.shot.name or shot.stem
-    lead = f"What pegbar has found and made for {shot.name}. Stages that have not run are left out."
+    lead = (
+        f"What pegbar has found and made for {shot.name}. Stages that have not run are left out; figures with a limit "
+        "are those that pegbar warns of above it. A click on a picture shows it in full size, another one puts it back."
+    )
     page.parent.mkdir(parents=True, exist_ok=True)
     atomic.write_bytes(page, html_page(name, lead, sections).encode())
     print(f"report: {', '.join(section.title for section in sections)}, in {os.path.relpath(page)}")

@@ -63,7 +63,7 @@ def _run(stage: SecondaryStage, options: BatchOptions) -> int:
             return 1
     for note in stage.own_work(scene) if stage.made["simulation"] else ():
         print(f"pegbar: note: {note}", file=sys.stderr)
-    print(f"simulation: {scene.frames} frames {_made(stage, 'simulation')}")
+    print(f"simulation: {scene.frames} frame{'' if scene.frames == 1 else 's'} {_made(stage, 'simulation')}")
     frames = stage.frames(drivings, scene)
     if code := _render(stage, frames, options):
         return code
@@ -96,11 +96,13 @@ def _made(stage: SecondaryStage, name: str) -> str:
 
 
 def _deep(report: dict[str, Any]) -> list[str]:
-    """What lies deeper in a limb than a hundredth of the character's height."""
+    """What lies too deep in a limb."""
+    from pegbar.report.figures import DEEP
+
     said = []
     for kind in ("cloth", "strands", "particles"):
         for name, part in report.get(kind, {}).items():
-            if (depth := part["deepest_penetration_m"]) > 0.01 * report["height_m"]:
+            if (depth := part["deepest_penetration_m"]) > DEEP * report["height_m"]:
                 said.append(f"{name} lies {1000 * depth:.0f} mm deep in {part['in_limb']} in frame {part['in_frame']}")
     return said
 

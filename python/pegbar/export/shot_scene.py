@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pegbar.scene.camera import PerspectiveCamera
+from pegbar.scene.camera_moves import CameraMoves
+from pegbar.scene.film_view import FilmView
 from pegbar.simulate.scene import Character
 
 Floats = NDArray[np.float64]
@@ -26,6 +28,8 @@ class ShotScene:
     ``frames`` (F) are film frame numbers, one after the other; ``drawings`` (F) the drawing that each shows, None
     where it shows none. ``cameras`` (F) see the ``characters``, whose tracks have F frames and NaN where nothing is
     known. ``ground`` is the floor's height or None, ``pictures`` (F) the drawings' files. World metres, y up.
+
+    Where the ``moves`` of an exposure sheet's camera are in the cameras, ``views`` (F) are what it sees of drawings.
     """
 
     name: str
@@ -36,6 +40,8 @@ class ShotScene:
     characters: tuple[Character, ...]
     ground: float | None = None
     pictures: tuple[Path | None, ...] = ()
+    moves: CameraMoves | None = None
+    views: tuple[FilmView, ...] = ()
 
     @property
     def image_size(self) -> tuple[int, int]:
@@ -94,6 +100,22 @@ def _lens(inner: Floats, size: tuple[int, int]) -> Lens:
 def _one(ratio: float) -> float:
     """Pixels that differ from squares by rounding alone are squares."""
     return 1.0 if abs(ratio - 1) < 1e-12 else ratio
+
+
+def filmed(scene: ShotScene, moves: CameraMoves | None, size: tuple[int, int] | None) -> ShotScene:
+    """Return ``scene``, whose cameras see whole drawings, as the sheet's camera sees it: frames of ``size``.
+
+    A pan moves the film behind the lens, a zoom lengthens the lens, and a turn rolls the camera: in perspective the
+    picture moves just as the paper does. What is seen as it is stays so.
+    """
+    paper = scene.image_size
+    places = [{} if moves is None else moves.at(frame) for frame in scene.frames]
+    views = tuple(FilmView(paper, size or paper, **place) for place in places)
+    if all(view.is_whole for view in views):
+        return replace(scene, moves=moves)
+    cameras = tuple(view.camera(camera) for view, camera in zip(views, scene.cameras, strict=True))
+    # A picture of the whole drawing fits no frame of a camera that moves over it.
+    return replace(scene, cameras=cameras, moves=moves, views=views, pictures=(None,) * len(views))
 
 
 def camera_poses(cameras: tuple[PerspectiveCamera, ...]) -> Floats:

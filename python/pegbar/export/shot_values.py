@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pegbar.export.shot_scene import ShotScene, camera_poses
+from pegbar.scene.camera_moves import TRACKS
 from pegbar.simulate.scene import Character
 
 _LIMB = ("start", "end", "start_radius", "end_radius")
@@ -20,6 +21,7 @@ CONVENTIONS = {
     "pixels": "centres at integers, origin top left, y down",
     "camera.matrix": "world metres to homogeneous pixels; the third row gives the planar depth in metres",
     "camera.to_world": "camera to world; the camera's axes are right, up and back",
+    "exposure_sheet": "the moves over drawings of this size that are in the camera: pixels, factor, degrees clockwise",
     "null": "not known in this frame",
 }
 
@@ -71,8 +73,17 @@ def shot_table(scene: ShotScene, folder: Path) -> dict[str, Any]:
         "pictures": [None if path is None else _beside(path, folder) for path in scene.pictures],
         "ground": scene.ground,
         "camera": camera,
+        **_views(scene),
         "characters": [_character(character) for character in scene.characters],
     }
+
+
+def _views(scene: ShotScene) -> dict[str, Any]:
+    """How the exposure sheet's camera moves over the drawings, where it does."""
+    if not scene.views:
+        return {}
+    moves = {track: [getattr(view, track) for view in scene.views] for track in TRACKS}
+    return {"exposure_sheet": {"paper": list(scene.views[0].paper), **moves}}
 
 
 def _beside(path: Path, folder: Path) -> str:

@@ -18,14 +18,16 @@ from typing import Any
 
 from pegbar.errors import FormatError
 from pegbar.io.atomic import write_bytes
+from pegbar.io.camera_cells import CameraCell, camera_tracks, read_camera_work
+from pegbar.scene.camera_moves import TRACKS
 
 Cells = tuple[int | None, ...]
 _XDTS = "exchangeDigitalTimeSheet Save Data"
 _CELLS, _CAMERA_WORK, _VERSION = 0, 5, 5
 _HELD = {"", "SYMBOL_HYPHEN", "SYMBOL_TICK_1", "SYMBOL_TICK_2"}
 _NOTHING = {"x", "X", "\u00d7", "-", "SYMBOL_NULL_CELL"}
-#: Columns of a CSV file that say how the camera moves.
-CAMERA = ("pan_x", "pan_y", "zoom", "rotate")
+#: Columns of a CSV file, and tracks of camera work, that say how the camera moves.
+CAMERA = (*TRACKS, "ease")
 _MOST = 1_000_000
 
 
@@ -33,12 +35,14 @@ _MOST = 1_000_000
 class ExposureSheet:
     """For every level the drawing of each frame from ``first_frame`` on, None where it shows none.
 
-    ``camera`` are the camera moves that the file names, in its own words.
+    ``camera`` are the cells of the camera's columns that are not empty, and ``instructions`` what camera work says in
+    words that are no numbers.
     """
 
     levels: dict[str, Cells]
     first_frame: int = 1
-    camera: tuple[str, ...] = ()
+    camera: tuple[CameraCell, ...] = ()
+    instructions: tuple[str, ...] = ()
 
     def level(self, name: str | None = None) -> Cells:
         """Return the cells of a level, without a name of the only one; ValueError lists what there is."""
@@ -84,10 +88,14 @@ def csv_text(sheet: ExposureSheet) -> str:
     """Return ``sheet`` as CSV: a row a frame, x where a level shows nothing."""
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
-    table.writerow(["frame", *sheet.levels])
+    moves = {(cell.frame, cell.column): cell.text for cell in sheet.camera}
+    tracks = [column for column in CAMERA if any(cell.column == column for cell in sheet.camera)]
+    table.writerow(["frame", *sheet.levels, *tracks])
     for row in range(_length(sheet)):
+        frame = sheet.first_frame + row
         cells = [column[row] if row < len(column) else None for column in sheet.levels.values()]
-        table.writerow([sheet.first_frame + row, *("x" if cell is None else cell for cell in cells)])
+        shown = ["x" if cell is None else cell for cell in cells]
+        table.writerow([frame, *shown, *(moves.get((frame, track), "") for track in tracks)])
     return text.getvalue()
 
 
@@ -99,12 +107,15 @@ def xdts_text(sheet: ExposureSheet, name: str) -> str:
         changes = [row for row, cell in enumerate(cells) if not row or cell != cells[row - 1] or row == len(column)]
         frames = [{"data": [{"id": 0, "values": [_symbol(cells[row])]}], "frame": row} for row in changes]
         tracks.append({"frames": frames, "trackNo": number})
-    table = {
+    table: dict[str, Any] = {
         "fields": [{"fieldId": _CELLS, "tracks": tracks}],
         "duration": _length(sheet),
         "name": name,
         "timeTableHeaders": [{"fieldId": _CELLS, "names": list(sheet.levels)}],
     }
+    if work := camera_tracks(sheet.camera, sheet.first_frame):
+        table["fields"].append({"fieldId": _CAMERA_WORK, "tracks": [track for _, track in work]})
+        table["timeTableHeaders"].append({"fieldId": _CAMERA_WORK, "names": [name for name, _ in work]})
     content = {"header": {"cut": "1", "scene": "1"}, "timeTables": [table], "version": _VERSION}
     return f"{_XDTS}\n{json.dumps(content, indent=1, ensure_ascii=False)}\n"
 
@@ -128,6 +139,7 @@ def _read_csv(path: Path, text: str) -> ExposureSheet:
         raise FormatError(path, f"want a name for every level, each once, got {', '.join(names)}", line=1)
     columns: dict[str, list[int | None]] = {name: [] for name in names if name not in CAMERA}
     start: int | None = None
+    camera: list[CameraCell] = []
     for line, row in rows[1:]:
         frame = _frame(path, row[0], line)
         start = frame if start is None else start
@@ -138,9 +150,11 @@ def _read_csv(path: Path, text: str) -> ExposureSheet:
             _hold(column, frame - start)
             place = names.index(name) + 1
             column.append(_cell(path, row[place] if place < len(row) else "", column, f"frame {frame}", line))
+        named = [(name, text.strip()) for name, text in zip(names, row[1:], strict=False) if name in CAMERA]
+        camera += [CameraCell(frame, name, text, line) for name, text in named if text]
     if start is None:
         raise FormatError(path, "the sheet has no frames", line=1)
-    return ExposureSheet(_levels(path, columns), start, tuple(name for name in names if name in CAMERA))
+    return ExposureSheet(_levels(path, columns), start, tuple(camera))
 
 
 def _frame(path: Path, text: str, line: int) -> int:
@@ -193,20 +207,13 @@ def _read_xdts(path: Path, text: str) -> ExposureSheet:
             while name in columns:
                 name += "_"
             columns[name] = _track(path, track, duration, name)
-        words = [
-            str(value)
-            for track in fields.get(_CAMERA_WORK, [])
-            for frame in track["frames"]
-            for data in frame["data"]
-            for value in data.get("values", [])
-        ]
+        camera, instructions = read_camera_work(fields.get(_CAMERA_WORK, []), names.get(_CAMERA_WORK, []), duration)
     except (ValueError, KeyError, IndexError, TypeError, AttributeError) as error:
         if isinstance(error, FormatError):
             raise
         reason = f"{type(error).__name__} {error}" if not isinstance(error, json.JSONDecodeError) else str(error)
         raise FormatError(path, f"the XDTS is damaged: {reason}") from None
-    camera = tuple(word for word in dict.fromkeys(words) if word and not word.startswith("SYMBOL_"))
-    return ExposureSheet(_levels(path, columns), 1, camera)
+    return ExposureSheet(_levels(path, columns), 1, camera, instructions)
 
 
 def _track(path: Path, track: dict[str, Any], duration: int, name: str) -> list[int | None]:

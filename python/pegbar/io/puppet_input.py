@@ -72,7 +72,9 @@ def read_puppet_input(
         raise FileNotFoundError(2, "no such file or directory", str(given))
     if joints is None:
         names = f"{picture.stem}.json, {picture.stem}.yaml, {', '.join(BESIDE)}"
-        raise FileNotFoundError(2, f"no joints are marked beside the picture (looked for {names})", str(picture))
+        raise FileNotFoundError(
+            2, f"no joints are marked beside the picture (looked for {names}; --joints names another)", str(picture)
+        )
     drawing = read_annotations(joints)
     place = _frame(drawing, given, frame)
     if given is None and not drawing.images:

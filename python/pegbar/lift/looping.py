@@ -16,6 +16,8 @@ Floats = NDArray[np.float64]
 TRAVELS = 0.25
 #: The seam is blended into this part of the frames on either side, and into no more than so many.
 SHARE, MOST = 0.3, 8
+#: A loop has as many frames at least.
+FEWEST = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +61,8 @@ def close_loop(motion: Motion, *, blend: int | None = None) -> Loop:
     [0.0, 0.0, 0.0]
     """
     frames = len(motion.positions)
-    if frames < 3:
-        raise ValueError(f"motion: want 3 frames or more to close a loop, got {frames}")
+    if frames < FEWEST:
+        raise ValueError(f"motion: want {FEWEST} frames or more to close a loop, got {frames}")
     reach = max(min(round(SHARE * frames), MOST), 1) if blend is None else blend
     if not 1 <= reach <= frames / 2:
         raise ValueError(f"blend: want 1 to {frames // 2} frames, got {blend}")

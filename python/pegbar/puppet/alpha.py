@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import importlib.util
+import logging
+import threading
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Literal, get_args
 
 import cv2
@@ -22,6 +26,8 @@ Matting = Literal["auto", "closed form", "guided", "mask"]
 BAND, LEAST_BAND = 0.004, 3.0
 #: How far the guided filter looks around a pixel, in bands, and what it takes for flat (squared, of 0 to 1).
 _LOOK, _FLAT = 2.0, 5e-3
+# Seconds after which the user is told what takes so long: PyMatting compiles at its first use.
+_PATIENCE = 3.0
 
 
 def figure_alpha(image: Pixels, mask: Flags, method: Matting = "auto") -> Coverage:
@@ -73,14 +79,25 @@ def figure_alpha(image: Pixels, mask: Flags, method: Matting = "auto") -> Covera
 
 
 def _closed_form(image: Pixels, sure: Flags, nothing: Flags) -> Coverage:
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            from pymatting import estimate_alpha_cf
-    except ImportError:
-        raise MissingExtraError("closed-form matting", "matting") from None
-    trimap = np.where(sure, 1.0, np.where(nothing, 0.0, 0.5))
-    with warnings.catch_warnings():
+    with _told_when_slow(), warnings.catch_warnings():
         warnings.simplefilter("ignore")
+        try:
+            from pymatting import estimate_alpha_cf
+        except ImportError:
+            raise MissingExtraError("closed-form matting", "matting") from None
+        trimap = np.where(sure, 1.0, np.where(nothing, 0.0, 0.5))
         alpha = estimate_alpha_cf(image / 255.0, trimap)
     return np.asarray(alpha, np.float32)
+
+
+@contextmanager
+def _told_when_slow() -> Iterator[None]:
+    """Tell, while it happens, what the user waits for."""
+    note = "pegbar: note: closed-form matting takes a while: at its first use it compiles, for about a minute"
+    timer = threading.Timer(_PATIENCE, lambda: logging.getLogger("pegbar").warning(note))
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()

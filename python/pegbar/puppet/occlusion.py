@@ -6,6 +6,7 @@ there until it is clearly behind. So nothing flickers where two limbs have about
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +25,8 @@ HYSTERESIS = 0.02
 #: The same by which an arm must be farther (or nearer) than a bone of the body or of a leg to go behind (or before) it
 #: against the drawing: they are thick, and an arm that hangs beside them has about the depth of their middle.
 BODY = 0.05
+#: A change of order that is undone within so many pictures is a flicker, if it is not the two limbs' own.
+BRIEF = 3
 _ARM_ENDS = ("elbow", "hand", "wrist")
 
 
@@ -85,13 +88,40 @@ def piece_ranks(pieces: Pieces, bones: Ints, camera: PerspectiveCamera, poses: F
     behind += BODY * size * _leaning(pieces, drawn, first, second)[known]
     front[:, known] = settle(behind, cover, HYSTERESIS * size, drawn[known])
     touching[:, known] = cover
-    relation = np.zeros((len(poses), count, count), np.int8)
+    ranks = _all_ranks(front, touching, first, second, count)
+    # Where three are in front of one another all round, one order or another is broken: but not to and fro.
+    shown = calmed(ranks[:, first] > ranks[:, second], front, touching)
+    return _all_ranks(shown, touching, first, second, count)
+
+
+def _all_ranks(front: Flags, touching: Flags, first: Ints, second: Ints, count: int) -> Ints:
+    """The place (F, P) of every piece in each frame, from which of each pair is in ``front`` (F, K)."""
+    relation = np.zeros((len(front), count, count), np.int8)
     strength = np.where(front, 1, -1) * (1 + touching)
     relation[:, first, second], relation[:, second, first] = strength, -strength
-    ranks = np.zeros((len(poses), count), np.int64)
+    ranks = np.zeros((len(front), count), np.int64)
     for frame, related in enumerate(relation):
         ranks[frame] = _ranks(related, ranks[max(frame - 1, 0)])
     return ranks
+
+
+def calmed(shown: Flags, front: Flags, touching: Flags) -> Flags:
+    """Return who is ``shown`` in front (F, K) without flickers.
+
+    A change that is undone within `BRIEF` pictures, while both are ``touching`` (F, K), is none, but where it is the
+    two limbs' own: ``front`` (F, K) is who is in front of the two alone.
+    """
+    result = shown.copy()
+    changes = shown[1:] != shown[:-1]
+    for pair in np.flatnonzero(changes.sum(axis=0) > 1):
+        edges = np.concatenate([[0], np.flatnonzero(changes[:, pair]) + 1, [len(shown)]])
+        for start, end in itertools.pairwise(edges.tolist()):
+            if start == 0 or end == len(shown) or end - start > BRIEF:
+                continue
+            around = slice(start - 1, end + 1)
+            if touching[around, pair].all() and (shown[around, pair] != front[around, pair]).any():
+                result[start:end, pair] = result[start - 1, pair]
+    return result
 
 
 def settle(behind: Floats, cover: Flags, margin: float, drawn: Flags) -> Flags:

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pegbar.errors import DegenerateError
-from pegbar.puppet.limb_ends import cut_ends
+from pegbar.puppet.limb_ends import WINDOW, cut_ends
 from pegbar.puppet.parts import bone_distances
 from pegbar.puppet.template import covered, fit_template, person_template
+from pegbar.puppet.twin_ends import even_ends
 from pegbar.puppet.view import View, drawn_view
 from pegbar.scene.puppet_input import PuppetInput
 
@@ -106,7 +107,8 @@ def person_mask(source: PuppetInput, view: View | None = None) -> Flags:
     cv2.grabCut(part, labels, None, *models, _ROUNDS, cv2.GC_INIT_WITH_MASK)
     mask = np.zeros(seeds.shape, bool)
     mask[window] = np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD))
-    return cut_ends(source, _tidied(mask, source, trunk), seeds, likely, trunk, _REACH * trunk)
+    mask = cut_ends(source, _tidied(mask, source, trunk), seeds, likely, trunk, _REACH * trunk)
+    return even_ends(source, mask, trunk, WINDOW * trunk)
 
 
 def _seeds(source: PuppetInput, likely: Flags, trunk: float) -> Labels:

@@ -14,8 +14,8 @@ from pegbar.scene.lifted import Lifted
 Floats = NDArray[np.float64]
 #: Limbs whose drawn length changes more than this, relative, do not fit rigid bones.
 RIGID = 0.08
-#: Marks this many pixels from the skeleton are told, and this share of the figure's height.
-_FAR = 0.05
+#: A skeleton that is farther from the marks than this share of the figure's height is told.
+FAR = 0.05
 #: Metres: a clip whose poses differ less has no movement.
 _STILL = 0.02
 
@@ -52,6 +52,7 @@ def quality(alignment: Alignment, lifted: Lifted, numbers: Sequence[int]) -> dic
         "to_clip_m": _rms(np.linalg.norm(posed - alignment.clip[:, known], axis=2)),
         "loop_travel_m": lifted.travel.round(4).tolist(),
         "skeleton_size": lifted.size,
+        "figure_height_px": alignment.figure_height,
     }
 
 
@@ -74,7 +75,9 @@ def notes(
     if lost := [name for name in alignment.names if name not in lifted.names]:
         found.append(f"the clip has no joint for {', '.join(lost)}: left out")
     poses = alignment.clip - np.nanmean(alignment.clip, axis=1, keepdims=True)
-    if float(np.nanmax(np.ptp(poses, axis=0))) < _STILL:
+    if len(numbers) == 1:
+        found.append("one drawing is one pose: one frame is written for each that shows it")
+    elif float(np.nanmax(np.ptp(poses, axis=0))) < _STILL:
         found.append("the clip stands still: all depth is that of one pose, and no foot is known to leave the ground")
     # At the clip's depth, since rigid limbs have one length whatever is drawn.
     known = [alignment.names.index(name) for name in lifted.names]
@@ -88,7 +91,7 @@ def notes(
         )
     height = float(np.median(np.ptp(alignment.markers[..., 1], axis=1)))
     worst = values["skeleton_to_markers_worst"]
-    if values["skeleton_reprojection_px"] > _FAR * height and not stretch:
+    if values["skeleton_reprojection_px"] > FAR * height and not stretch:
         found.append(
             f"the skeleton is {values['skeleton_reprojection_px']:.0f} px from the drawn marks "
             f"({values['skeleton_reprojection_px'] / height:.0%} of the figure's height), most at {worst['joint']} in "

@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 
 from pegbar.scene.camera import PerspectiveCamera
 
+#: Marks that are farther from the clip than this share of the figure's height are told to the user.
+MISFIT = 0.1
+
 
 @dataclass(frozen=True, eq=False)
 class Alignment:

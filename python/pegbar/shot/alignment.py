@@ -11,7 +11,7 @@ from pegbar.align.camera_track import CameraTrack
 from pegbar.lift.backprojection import back_project
 from pegbar.lift.contact import ground_depths
 from pegbar.lift.hidden import fill_hidden
-from pegbar.scene.alignment import Alignment
+from pegbar.scene.alignment import MISFIT, Alignment
 from pegbar.scene.contacts import FEET, ankle_heights, foot_contacts
 from pegbar.scene.drawing import Drawing
 from pegbar.scene.mirror import exchanged, mirrored
@@ -20,8 +20,6 @@ from pegbar.shot.registered import CameraOptions, View, register_clip
 from pegbar.shot.retiming import Marks, Retiming
 
 Floats = NDArray[np.float64]
-# Marks that are farther from the clip than this share of the figure's height are told to the user.
-_MISFIT = 0.1
 # How high an ankle rests over the floor, in metres, where the clip does not tell.
 _ANKLE = 0.08
 
@@ -162,11 +160,11 @@ def _doubts(drawing: Drawing, known: list[int], track: CameraTrack) -> list[str]
     sizes = np.nanmax(marks[..., 1], axis=1) - np.nanmin(marks[..., 1], axis=1)
     height, usual = float(np.median(sizes)), float(np.median(track.errors))
     doubts = []
-    if track.error > _MISFIT * height:
+    if track.error > MISFIT * height:
         doubts.append(
             f"the clip does not fit: marks are {track.error:.1f} px from it, {track.error / height:.0%} of the figure"
         )
-    poor = np.flatnonzero(track.errors > max(3 * usual, _MISFIT * height))
+    poor = np.flatnonzero(track.errors > max(3 * usual, MISFIT * height))
     return doubts + [
         f"drawing {frame}: the clip is {track.errors[frame]:.1f} px away (usually {usual:.1f})" for frame in poor
     ]

@@ -89,9 +89,10 @@ class CheckStage:
         assert self.shot.beauty is not None
         path = self.shot.beauty.path(frame)
         try:
-            beauty, depth, _ = CompositeStage(self.shot).read_rendered(frame)
+            stage = CompositeStage(self.shot)
+            beauty, depth, _ = stage.read_rendered(frame)
             if size is not None:
-                check_passes(frame, path, size, beauty, depth)
+                check_passes(frame, path, stage.rendered_shape(size), beauty, depth)
         except (ValueError, OSError) as error:
             return [_problem(frame, "passes.beauty", describe(error))]
         return [] if drawn is None else _units(frame, drawn, depth)

@@ -11,6 +11,7 @@ import numpy as np
 
 from pegbar.errors import describe
 from pegbar.io.alignment import read_alignment
+from pegbar.io.numbers import format_frames
 from pegbar.scene.joints import misspelt_markers
 from pegbar.shot.align_stage import AlignStage
 from pegbar.shot.clip_choice import check_part, read_clip
@@ -31,7 +32,15 @@ def section_problems(shot: Shot, *, seen: frozenset[int] | None = None) -> list[
 
     ``seen`` are the labels that the label pictures show; None: not known.
     """
-    found = [*_palette(shot, seen), *_dots(shot), *_marks(shot), *_clip(shot), *_camera(shot), *_lift(shot)]
+    found = [
+        *_held(shot),
+        *_palette(shot, seen),
+        *_dots(shot),
+        *_marks(shot),
+        *_clip(shot),
+        *_camera(shot),
+        *_lift(shot),
+    ]
     if shot.settings.secondary is not None:
         found += _secondary(shot, shot.settings.secondary)
     return found
@@ -43,6 +52,17 @@ def _at(shot: Shot, key: str, what: str, how: str = "") -> Problem:
     if own.partition(".")[0] == key.partition(".")[0] and " " not in own and own != what:
         key, what = own, what.partition(": ")[2]
     return Problem(what, how or mend(what), key, shot.place(key))
+
+
+def _held(shot: Shot) -> Iterator[Problem]:
+    """Drawings that are held, and of which the shot's frames show only the first."""
+    hold, frames = shot.settings.drawing.hold, shot.settings.shot.frames
+    if not isinstance(hold, int) or hold == 1 or frames is None:
+        return
+    shown = {shot.exposure.drawing(frame) for frame in shot.frames}
+    if unseen := [number for number in shot.drawings.numbers if number not in shown]:
+        what = f"drawings {format_frames(unseen)} are shown in no frame: each is held for {hold} of frames {frames}"
+        yield replace(_at(shot, "shot.frames", what, "take shot.frames away, or name more frames"), note=True)
 
 
 def _palette(shot: Shot, seen: frozenset[int] | None) -> Iterator[Problem]:
@@ -216,4 +236,4 @@ def _secondary(shot: Shot, section: SecondarySection) -> Iterator[Problem]:
         yield _at(shot, "drawing.annotations", what, "add limbs to the annotations")
     if marks is not None and shot.settings.clip is None and (marks.depths is None or not marks.cameras):
         what = "the marks have no cameras and depths, and there is no clip to find them with"
-        yield _at(shot, "secondary", what, "name a clip in [clip]")
+        yield _at(shot, "secondary", what, "name a clip in [clip]: pegbar match --write does")

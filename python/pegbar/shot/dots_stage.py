@@ -22,7 +22,7 @@ from pegbar.io.sequence import FrameSequence
 from pegbar.layer.carry import carry_marks
 from pegbar.layer.dots import Dots, find_dots
 from pegbar.layer.matte import ink_alpha
-from pegbar.scene.body import MARKERS, limbs_between
+from pegbar.scene.body import LIMBS, MARKERS, limbs_between
 from pegbar.scene.drawing import Drawing
 from pegbar.scene.joints import EXTRA
 from pegbar.shot.find import find_input
@@ -133,8 +133,7 @@ class DotsStage:
         limbs = tuple(replace(limb, color=colors.get(limb.name)) for limb in limbs_between(names))
         known = [limb.name for limb in limbs]
         if strange := [name for name in colors if name not in known]:
-            told = f"no limb {', '.join(strange)} between joints that have dots: dot both its ends"
-            raise ShotError([f"{self.path}: dots.limbs: {told} (there are {', '.join(known)})"])
+            raise ShotError([f"{self.path}: dots.limbs: {_undotted(strange, names, known)}"])
         between = [number for number, key in zip(numbers, keyed, strict=True) if not key]
         return Drawing(
             names=names,
@@ -164,6 +163,16 @@ class DotsStage:
     def _recipe(self, joints: dict[str, str]) -> str:
         parts: list[Any] = [VERSION, self._section().model_dump(), joints, self._rate(), self.settings.drawing.hold]
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+
+
+def _undotted(strange: list[str], names: tuple[str, ...], known: list[str]) -> str:
+    """Why there are no limbs ``strange`` between the joints ``names``: ends without a dot, or no such limb."""
+    ends = {limb.name: (limb.start, limb.end) for limb in LIMBS}
+    lost = dict.fromkeys(end for name in strange for end in ends.get(name, ()) if end not in names)
+    told = f"no limb {', '.join(strange)} between joints that have dots"
+    if lost:
+        return f"{told}: dot {', '.join(lost)} too, at least once, where it would be (or leave the limb out)"
+    return f"{told} (there are {', '.join(known)})"
 
 
 def _problem(table: dict[str, str]) -> str | None:

@@ -40,6 +40,11 @@ class Drawn:
     limbs: frozenset[int] | None = None
     labels: NDArray[np.uint8] | None = None
 
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels."""
+        return self.alpha.shape[1], self.alpha.shape[0]
+
 
 def drawn_inputs(shot: Shot, frame: int) -> list[Path]:
     """Return the picture files that `read_drawn` reads for ``frame``."""

@@ -18,6 +18,7 @@ from pegbar.export.shot_scene import ShotScene
 from pegbar.export.shot_usd import shot_usd
 from pegbar.export.shot_values import shot_arrays, shot_table
 from pegbar.io import atomic
+from pegbar.io.camera_cells import camera_cells
 from pegbar.io.exposure_sheet import ExposureSheet, csv_text, xdts_text
 
 Format = Literal["usd", "gltf", "npz", "blender", "exposure"]
@@ -89,7 +90,8 @@ def export_notes(scene: ShotScene, formats: Sequence[Format]) -> list[str]:
 
 
 def _sheet(scene: ShotScene) -> ExposureSheet:
-    return ExposureSheet({"drawing": scene.drawings}, scene.frames[0])
+    moves = scene.moves and scene.moves.within(scene.frames[0], scene.frames[-1])
+    return ExposureSheet({"drawing": scene.drawings}, scene.frames[0], camera_cells(moves) if moves else ())
 
 
 def _npz(scene: ShotScene) -> bytes:

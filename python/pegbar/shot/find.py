@@ -8,12 +8,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
-from pegbar.errors import describe
+from pegbar.errors import ShotError, describe
+from pegbar.io.camera_cells import camera_moves
 from pegbar.io.exposure import Exposure
 from pegbar.io.exposure_sheet import read_exposure_sheet
 from pegbar.io.frames import PICTURE_SUFFIXES
 from pegbar.io.numbers import format_frames
 from pegbar.io.sequence import FrameSequence
+from pegbar.scene.camera_moves import CameraMoves
 from pegbar.scene.drawing import Drawing
 from pegbar.shot.model import DrawingSection
 
@@ -50,7 +52,8 @@ class Problems:
             return function(*arguments)
         except (ValueError, OSError) as error:
             path = getattr(error, "key", ()) or tuple(key.split("."))
-            self.found.append(f"{place_of(self.source, self.lines, path)}: {'.'.join(path)}: {describe(error)}")
+            place = f"{place_of(self.source, self.lines, path)}: {'.'.join(path)}"
+            self.found += [f"{place}: {line}" for line in getattr(error, "problems", [describe(error)])]
             return None
 
 
@@ -82,6 +85,21 @@ def find_exposure(drawing: DrawingSection, folder: Path, drawings: FrameSequence
     if missing := sorted({cell for cell in cells if cell is not None} - {*drawings.numbers}):
         raise ValueError(f"{drawing.exposure} shows drawing {format_frames(missing)}: there is no such picture")
     return Exposure.of_cells(cells, sheet.first_frame)
+
+
+def find_moves(drawing: DrawingSection, folder: Path) -> CameraMoves | None:
+    """Return the moves of the sheet's camera, None where there are none; ShotError with every wrong row."""
+    if drawing.exposure is None or drawing.camera == "drawn":
+        return None
+    try:
+        sheet = read_exposure_sheet(folder / drawing.exposure)
+    except (ValueError, OSError):
+        # `find_exposure` tells.
+        return None
+    moves, problems = camera_moves(sheet.camera, drawing.exposure)
+    if problems:
+        raise ShotError(problems)
+    return moves
 
 
 def plan_output(folder: Path, key: str, pattern: str) -> FrameSequence:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pegbar.export.shot_scene import ShotScene
 from pegbar.io.atomic import clean_leftovers
 from pegbar.io.exr import write_exr
+from pegbar.io.hold import hold
 from pegbar.io.sequence import FrameSequence
 from pegbar.layer.depth_convention import ray_lengths
 from pegbar.shot.find import check_clash, plan_output
@@ -23,13 +24,17 @@ from pegbar.shot.passes_check import Alpha, ImportOptions, Judgement, judge
 
 @dataclass(frozen=True, eq=False)
 class ImportStage:
-    """Passes ``incoming`` of ``frames`` that were rendered for ``scene``; results go to ``folder``."""
+    """Passes ``incoming`` of ``frames`` that were rendered for ``scene``; results go to ``folder``.
+
+    ``camera`` says whether the scene's cameras move with those of an exposure sheet.
+    """
 
     incoming: Incoming
     frames: tuple[int, ...]
     scene: ShotScene
     folder: Path
     options: ImportOptions
+    camera: Literal["sheet", "drawn"] = "drawn"
 
     @property
     def outputs(self) -> FrameSequence:
@@ -48,7 +53,14 @@ class ImportStage:
         return found, None if any(line.kind == "problem" for line in found) else judgement
 
     def run(self, judgement: Judgement, progress: Callable[[], None] | None = None) -> None:
-        """Write every frame as ``judgement`` says; OSError or FormatError for a file that fails, which is named."""
+        """Write every frame as ``judgement`` says; OSError or FormatError for a file that fails, which is named.
+
+        BusyError, an OSError, where another run writes to the folder.
+        """
+        with hold(self.folder):
+            self._write(judgement, progress)
+
+    def _write(self, judgement: Judgement, progress: Callable[[], None] | None) -> None:
         self.outputs.folder.mkdir(parents=True, exist_ok=True)
         clean_leftovers(self.outputs.folder)
         with ThreadPoolExecutor(2) as pool:

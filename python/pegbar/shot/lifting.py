@@ -11,6 +11,7 @@ from pegbar.align.retime import retime
 from pegbar.lift.angles import joint_angles
 from pegbar.lift.fitting import fit_skeleton
 from pegbar.lift.given import FEWEST_MARKS
+from pegbar.lift.looping import FEWEST as LOOP
 from pegbar.lift.looping import close_loop
 from pegbar.lift.markers import reconstruct_markers
 from pegbar.lift.pins import planted_targets
@@ -44,14 +45,15 @@ def lift_drawing(alignment: Alignment, clip: Motion, rate: float, options: LiftO
     Raises
     ------
     ValueError
-        For fewer than 2 drawings, a clip without a skeleton (unless another is given), a name that is no marker or
-        that hangs on nothing, or fewer than 3 drawings for a loop.
+        For a clip without a skeleton (unless another is given), a name that is no marker or that hangs on nothing, or
+        fewer than 3 drawings for a loop.
     DegenerateError
         For a drawing with fewer than 4 marks.
     """
-    frames = len(alignment.times)
-    if frames < 2:
-        raise ValueError(f"drawings: want 2 or more with marks to lift a motion, got {frames}")
+    if options.loop and len(alignment.times) < LOOP:
+        raise ValueError(
+            f"lift.loop: want {LOOP} drawings with marks or more to close a loop, got {len(alignment.times)}"
+        )
     known = np.flatnonzero(np.isfinite(alignment.clip).all(axis=(0, 2)))
     names = tuple(alignment.names[index] for index in known)
     bones = bones_between(names)

@@ -23,7 +23,9 @@ def parse_color(text: str) -> tuple[int, int, int]:
 
 # A colour is a triple, which is never empty.
 Color = Annotated[str, AfterValidator(lambda text: parse_color(text) and text.lower())]
+Size = tuple[Annotated[int, Field(gt=0, le=65_536)], Annotated[int, Field(gt=0, le=65_536)]]
 Coordinate = Annotated[float, Field(allow_inf_nan=False)]
+_as_entry = BeforeValidator(lambda value: {"preset": value} if isinstance(value, str) else value)
 
 
 class Section(BaseModel):
@@ -38,7 +40,7 @@ class ShotSection(Section):
     name: str | None = None
     frames: str | None = None
     frame_rate: float = Field(default=24.0, gt=0, allow_inf_nan=False)
-    size: tuple[Annotated[int, Field(gt=0)], Annotated[int, Field(gt=0)]] | None = None
+    size: Size | None = None
 
 
 class DrawingSection(Section):
@@ -48,6 +50,7 @@ class DrawingSection(Section):
     hold: Annotated[int, Field(ge=1)] | list[int] | Literal["sparse"] = 1
     exposure: str | None = None
     level: str | None = None
+    camera: Literal["sheet", "drawn"] = "sheet"
     labels: str | None = None
     annotations: str | None = None
     depth: str | None = None
@@ -107,6 +110,7 @@ class PassesSection(Section):
     depth: str | None = None
     layer: str | None = None
     unit: Literal["m", "cm", "mm", "inch", "foot"] | Annotated[float, Field(gt=0, allow_inf_nan=False)] = "m"
+    camera: Literal["sheet", "drawn"] = "drawn"
     space: Literal["auto", "linear", "display"] = "auto"
 
     @property
@@ -226,15 +230,11 @@ class ElementEntry(BaseModel):
         return dict(self.model_extra or {})
 
 
-def _as_entry(value: Any) -> Any:
-    return {"preset": value} if isinstance(value, str) else value
-
-
 class SecondarySection(Section):
     """``[secondary]``: what is simulated around the drawn character, and how it is rendered."""
 
     output: str = "secondary"
-    elements: list[Annotated[ElementEntry, BeforeValidator(_as_entry)]] = Field(default=[], min_length=1)
+    elements: list[Annotated[ElementEntry, _as_entry]] = Field(default=[], min_length=1)
     ground: Literal["auto", "none"] | Annotated[float, Field(allow_inf_nan=False)] = "auto"
     gravity: float = Field(default=9.81, ge=0, allow_inf_nan=False)
     wind: WindSection = WindSection()
@@ -263,6 +263,7 @@ class OutputSection(Section):
     visible: str | None = None
     layers: str | None = None
     space: Literal["auto", "display", "linear"] = "auto"
+    size: Size | None = None
 
     @model_validator(mode="after")
     def _linear_needs_floats(self) -> OutputSection:

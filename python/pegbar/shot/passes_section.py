@@ -7,6 +7,7 @@ import os
 import re
 import tomllib
 from pathlib import Path
+from typing import Literal
 
 from pegbar.errors import FormatError
 from pegbar.io.atomic import complete_file
@@ -14,15 +15,17 @@ from pegbar.shot.load import load_shot, validate_shot
 
 _HEADER = re.compile(r"\s*\[{1,2}\s*([^\]]+?)\s*\]{1,2}\s*(#.*)?$")
 _OLD = "# before: "
+Camera = Literal["sheet", "drawn"]
 
 
-def passes_text(pattern: str) -> str:
-    """Return the ``[passes]`` section for frames with colour and depth in one file."""
-    return f"[passes]\nbeauty = {json.dumps(pattern, ensure_ascii=False)}\n"
+def passes_text(pattern: str, camera: Camera = "drawn") -> str:
+    """Return the ``[passes]`` section for frames with colour and depth in one file, rendered with ``camera``."""
+    text = f"[passes]\nbeauty = {json.dumps(pattern, ensure_ascii=False)}\n"
+    return text + ('camera = "sheet"\n' if camera == "sheet" else "")
 
 
-def write_passes(shot: Path, frames: Path) -> str:
-    """Let the shot file name the passes ``frames``, a pattern; return the section.
+def write_passes(shot: Path, frames: Path, camera: Camera = "drawn") -> str:
+    """Let the shot file name the passes ``frames``, a pattern, rendered with ``camera``; return the section.
 
     Raises ShotError or FormatError for a shot file with problems: it is left as it is.
     """
@@ -32,7 +35,7 @@ def write_passes(shot: Path, frames: Path) -> str:
         pattern = Path(os.path.relpath(frames.absolute(), folder)).as_posix()
     except ValueError:
         pattern = frames.absolute().as_posix()
-    text, section = shot.read_bytes().decode("utf-8-sig"), passes_text(pattern)
+    text, section = shot.read_bytes().decode("utf-8-sig"), passes_text(pattern, camera)
     changed = replace_passes(text, section)
     if changed != text:
         try:

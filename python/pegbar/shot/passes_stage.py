@@ -15,24 +15,24 @@ from numpy.typing import NDArray
 from pegbar.io.exr import write_exr
 from pegbar.io.sequence import FrameSequence
 from pegbar.io.simulation_cache import DiskCache
-from pegbar.layer.composite import Space, depth_composite
-from pegbar.layer.rim import rim_depth
+from pegbar.layer.reframe import reframe_picture
 from pegbar.scene.mesh import Mesh
-from pegbar.shot.drawn import Drawn, drawn_inputs, read_drawn
+from pegbar.shot.drawn import drawn_inputs, read_drawn
+from pegbar.shot.framed import reframed_channels
+from pegbar.shot.layered import layered
 from pegbar.shot.model import SecondarySection
 from pegbar.shot.plan import Shot
 from pegbar.shot.rendered import part_seen, read_rendered
-from pegbar.shot.stages import Stage, check_passes, write_final
+from pegbar.shot.stages import Stage, write_final
 from pegbar.shot.view import LIGHT, View, lay_under, part_of, seen_window
 from pegbar.simulate.field_meshes import cast_on_fields
 from pegbar.simulate.fields import Puddle, SnowField
 from pegbar.simulate.layers import render_shadow, shadow_meshes
 from pegbar.simulate.meshes import Models, volume_meshes
-from pegbar.simulate.passes import Ink, Passes, render_passes
+from pegbar.simulate.passes import Ink, render_passes
 from pegbar.simulate.scene import BARE, SimulationScene
 
 VERSION = 1
-Floats = NDArray[np.float32]
 # Toon shading from the side turned away from the light to the lit one, and lines as wide as in a drawing of 960 pixels.
 BANDS = (0.42, 0.75, 1.0)
 INK = Ink(1.8, (0.03, 0.012, 0.028, 1.0), None)
@@ -105,10 +105,13 @@ class ElementsStage(Stage):
     def make(self, frame: int) -> tuple[str, ...]:
         view = self.render(frame)
         final, *exr = self.outputs(frame)
-        picture, notes = self._composite(frame, view.whole())
+        picture, notes = self._composite(frame, view)
         write_final(final, picture)
-        if exr:
+        film = self.shot.view(frame, view.size)
+        if exr and film is None:
             write_exr(exr[0], view.channels(), window=view.window)
+        elif exr and film is not None:
+            write_exr(exr[0], reframed_channels(view.channels(), film))
         return notes
 
     def picture(self, frame: int) -> NDArray[np.uint8]:
@@ -117,7 +120,7 @@ class ElementsStage(Stage):
         planned = replace(
             self, shot=replace(self.shot, settings=self.shot.settings.model_copy(update={"output": output}))
         )
-        return np.asarray(planned._composite(frame, planned.render(frame).whole())[0], np.uint8)
+        return np.asarray(planned._composite(frame, planned.render(frame))[0], np.uint8)
 
     def render(self, frame: int) -> View:
         """Return what is seen of the elements in ``frame`` and of their and the characters' shadows."""
@@ -141,33 +144,22 @@ class ElementsStage(Stage):
             lay_under(passes, shadow)
         return View(camera.image_size, window, passes, shadow)
 
-    def _composite(self, frame: int, passes: Passes) -> tuple[NDArray[Any], tuple[str, ...]]:
+    def _composite(self, frame: int, view: View) -> tuple[NDArray[Any], tuple[str, ...]]:
         """Put one character after the other into what is rendered, the shot's own first."""
         output = self.shot.settings.output
-        notes: list[str] = []
-        beauty: NDArray[Any] = passes.beauty
-        space: Space = "linear"
-        depth = rim_depth(passes.beauty, passes.depth)
-        shots = (self.shot, *self.layers.others)
-        for place, (shot, scale) in enumerate(zip(shots, (1.0, *self.layers.scales), strict=True), 1):
-            drawn = read_drawn(shot, frame)
-            notes += drawn.notes
-            check_passes(frame, self.layers.passes.path(frame), drawn.alpha.shape, beauty, depth)
-            drawn_depth = drawn.depth * np.float32(scale)
-            is_last = place == len(shots)
-            beauty = depth_composite(
-                drawn.color,
-                drawn.alpha,
-                drawn_depth,
-                beauty,
-                depth,
-                rendered_space=space,
-                space=output.composite_space,
-                dtype=np.uint8 if is_last and not output.is_exr else np.float32,
-            )
-            if not is_last:
-                depth, space = _nearest(depth, drawn, drawn_depth), output.composite_space
-        return beauty, tuple(notes)
+        drawn = [read_drawn(shot, frame) for shot in (self.shot, *self.layers.others)]
+        for one in drawn:
+            if one.alpha.shape != view.size[::-1]:
+                height, width = one.alpha.shape
+                raise ValueError(
+                    f"frame {frame}: the drawing has {width} x {height} pixels, "
+                    f"the elements {view.size[0]} x {view.size[1]}"
+                )
+        dtype = np.float32 if output.is_exr else np.uint8
+        picture = layered(view, drawn, (1.0, *self.layers.scales), output.composite_space, dtype)
+        film = self.shot.view(frame, view.size)
+        seen = picture if film is None else reframe_picture(picture, film)
+        return seen, tuple(note for one in drawn for note in one.notes)
 
     def _recipe(self, frame: int) -> str:
         layers, shot = self.layers, self.shot
@@ -178,12 +170,5 @@ class ElementsStage(Stage):
         for drawn in (shot, *layers.others):
             parts += [drawn.settings.drawing.model_dump(), drawn.matte]
             parts += [drawn.palette.colors.tolist(), drawn.palette.labels.tolist()]
+        parts += shot.framing(frame)
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
-
-
-def _nearest(rendered: Floats, drawn: Drawn, drawn_depth: Floats) -> Floats:
-    """The nearer depth of each of the drawing's pixels; a pixel drawn without depth keeps what is behind it."""
-    height, width = drawn.alpha.shape
-    blocks = rendered.reshape(height, rendered.shape[0] // height, width, rendered.shape[1] // width)
-    nearest: Floats = np.minimum(blocks.min(axis=(1, 3)), np.where(drawn.alpha > 0, drawn_depth, np.inf))
-    return nearest

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,13 +18,16 @@ from pegbar.io.numbers import parse_frames
 from pegbar.io.sequence import FrameSequence
 from pegbar.layer.matte import Mode
 from pegbar.scene.camera import PerspectiveCamera
+from pegbar.scene.camera_moves import CameraMoves
 from pegbar.scene.drawing import Drawing
+from pegbar.scene.film_view import FilmView
 from pegbar.shot.find import (
     KeyedError,
     Problems,
     check_clash,
     find_exposure,
     find_input,
+    find_moves,
     match_marks,
     place_of,
     plan_output,
@@ -49,7 +53,8 @@ class Shot:
     """A validated shot with its sequences found, its marks read and its frames known.
 
     ``marks`` tells which frame of the annotations belongs to a drawing number; ``matte`` is the one that all frames
-    get. ``source`` is the shot file as the user named it, ``lines`` where its keys stand.
+    get. ``source`` is the shot file as the user named it, ``lines`` where its keys stand. ``moves`` are those of the
+    exposure sheet's camera over the drawings.
     """
 
     settings: ShotFile
@@ -68,6 +73,7 @@ class Shot:
     outputs: dict[str, FrameSequence]
     source: str = "options"
     lines: Mapping[tuple[str, ...], int] = field(default_factory=dict)
+    moves: CameraMoves | None = None
 
     def place(self, key: str) -> str:
         """Return where ``key`` stands, as ``shot.toml:14``: its own line, or that of the section it would be in."""
@@ -76,6 +82,17 @@ class Shot:
     def output(self, key: str, frame: int) -> Path | None:
         """Return where ``frame`` of ``[output] key`` goes, or None where the shot file asks for none."""
         return self.outputs[key].path(frame) if key in self.outputs else None
+
+    def view(self, frame: int, paper: tuple[int, int]) -> FilmView | None:
+        """Return what film ``frame`` shows of drawings of ``paper`` (width, height), None for all as it is."""
+        size = self.settings.output.size or paper
+        view = FilmView(paper, size) if self.moves is None else FilmView(paper, size, **self.moves.at(frame))
+        return None if view.is_whole else view
+
+    def framing(self, frame: int) -> list[Any]:
+        """Return what decides of the drawings' part in film ``frame``, for records; empty for the whole."""
+        size = self.settings.output.size
+        return [] if size is None and self.moves is None else [size, self.moves and self.moves.at(frame)]
 
     def annotation_index(self, frame: int) -> int:
         """Return which frame of the annotations belongs to shot frame ``frame``; ValueError where there is none."""
@@ -116,9 +133,9 @@ def plan_shot(
     # Without the marks that the shot names nothing can be said of limbs.
     palette = problems.call("drawing.palette", _palette, settings, annotations) if read else None
     if settings.camera:
-        size = settings.shot.size or (annotations.image_size if annotations else (1, 1))
-        problems.call("camera.matrix", PerspectiveCamera, settings.camera.matrix, size)
+        problems.call("camera.matrix", PerspectiveCamera, settings.camera.matrix, (1, 1))
     outputs = _outputs(settings, folder, inputs, problems)
+    moves = problems.call("drawing.exposure", find_moves, drawing, folder)
     marks: dict[int, int] | None = {}
     exposure = frames = None
     if drawings is not None:
@@ -132,7 +149,7 @@ def plan_shot(
     rest = inputs["drawing.labels"], inputs["drawing.depth"], beauty, inputs.get("passes.depth") or beauty
     matte = _matte(settings, drawings)
     found = settings, folder, frames, drawings, exposure, *rest, annotations, marks, palette, matte, outputs
-    return Shot(*found, source, problems.lines)
+    return Shot(*found, source, problems.lines, moves)
 
 
 def _outputs(

@@ -9,6 +9,7 @@ from pathlib import Path
 from pegbar.errors import ShotError
 from pegbar.shot.batch import run_frames
 from pegbar.shot.check import CheckStage, FrameCheck
+from pegbar.shot.check_camera import camera_problems
 from pegbar.shot.check_output import output_problems
 from pegbar.shot.check_sections import section_problems
 from pegbar.shot.plan import Shot, open_shot
@@ -34,7 +35,7 @@ def preflight(
     # Marks as annotated, not as an older alignment left them; a part of the frames does not tell what none shows.
     bare, whole = open_shot(path, aligned=False), frames == list(shot.frames)
     problems += section_problems(bare, seen=seen if whole else None)
-    return [*problems, *output_problems(shot), *found], len(frames)
+    return [*problems, *output_problems(shot), *camera_problems(shot), *found], len(frames)
 
 
 def _opened(path: Path) -> tuple[list[Problem], Shot | None]:

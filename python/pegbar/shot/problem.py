@@ -23,6 +23,7 @@ _MENDS = (
     (r"same whole number of times", "render at the drawing's size, or at twice, three times it"),
     (r"want \d+ x \d+ pixels", "save the picture in that size, or correct shot.size"),
     (r"not a PNG, TIFF, JPEG or EXR|cannot decode|linear light, not", "save it as 8 or 16 bit PNG, TIFF or JPEG"),
+    (r"frame -?\d+: (pan_[xy]|zoom|rotate|ease): ", "correct that cell of the sheet (docs: exposure-sheets)"),
     (r"no depth: the shot needs", "give drawing.labels, drawing.half_width or drawing.depth"),
     (r"give no depths", "name a clip in [clip] and run pegbar align, or give the marks depths"),
     (r"has no place or no depth", "mark the joint in that drawing, or take the limb's colour out of it"),

@@ -92,21 +92,23 @@ class DrawnLimbs:
 
         Each drawing is compared with the poses near its own time; time and memory grow with the drawings.
         """
-        spread = slice(None, None, -(-len(moments) // _POSES))
-        lengths = [longest_seen(look(row, spread), self.limbs) for row in range(len(columns))]
+        coarse = moments[::FINE]
+        spread, thinned = _thinned(len(columns), len(moments))
+        lengths, shown = [], []
+        for row in range(len(columns)):
+            seen = look(row, slice(None, None, spread))
+            lengths.append(longest_seen(seen, self.limbs))
+            if row % thinned[0] == 0:
+                shown.append(self._costs(row, seen[:: FINE * thinned[1] // spread], lengths[row]))
         columns = self._settled(look, lengths, len(moments), columns)
-        times, coarse = np.interp(columns, np.arange(len(moments)), moments), moments[::FINE]
-        thinned = (-(-len(columns) // _SHOWN), -(-len(coarse) // _SHOWN))
-        shown = slice(None, None, FINE * thinned[1])
-        cost = np.concatenate(
-            [self._costs(row, look(row, shown), lengths[row]) for row in range(len(columns))[:: thinned[0]]]
-        )
         frames = np.rint(columns / FINE).astype(np.int64).clip(0, len(coarse) - 1)
         paired = [
             self._costs(row, look(row, slice(FINE * at, FINE * at + 1)), lengths[row]) for row, at in enumerate(frames)
         ]
         path = np.stack([np.arange(len(frames)), frames], axis=1)
-        return Retiming(cost, thinned, coarse, TimeWarp(path, float(np.sum(paired)), frames, columns / FINE), times)
+        warp = TimeWarp(path, float(np.sum(paired)), frames, columns / FINE)
+        times = np.interp(columns, np.arange(len(moments)), moments)
+        return Retiming(np.concatenate(shown), thinned, coarse, warp, times)
 
     def _settled(self, look: Look, lengths: list[Floats], count: int, columns: Floats) -> Floats:
         """The columns (F,) of ``count`` poses near ``columns`` that are cheap and run smoothly."""
@@ -123,6 +125,16 @@ class DrawnLimbs:
         trust = limb_trust(seen, self.limbs, lengths=np.where(lengths > 0, lengths, 1))
         angles = pose_descriptor(seen, self.limbs)
         return pose_distance(self.angles[part], angles, a_trust=self.trust[part], b_trust=trust)
+
+
+def _thinned(drawings: int, poses: int) -> tuple[int, tuple[int, int]]:
+    """Every so manieth pose tells how long limbs are seen; of coarse poses, every so manieth drawing and pose is shown.
+
+    What is shown is among those that tell.
+    """
+    spread = next((step for step in (1, 2) if poses <= step * _POSES), FINE * -(-poses // (FINE * _POSES)))
+    step = max(1, spread // FINE)
+    return spread, (-(-drawings // _SHOWN), step * -(-poses // (FINE * _SHOWN * step)))
 
 
 def _smoothly_cheap(cost: Floats, first: NDArray[np.intp], last: int, times: Floats, holds: Floats) -> Floats:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from pegbar.export.shot_scene import ShotScene
+from pegbar.export.shot_scene import ShotScene, filmed
 from pegbar.shot.dots_stage import DotsStage
 from pegbar.shot.load import load_shot
 from pegbar.shot.model import SecondarySection
@@ -76,6 +76,12 @@ def shot_scene(tracked: Tracked, progress: Progress | None = None) -> tuple[Shot
         tuple(None if number is None else shot.drawings.path(number) for number in drawings),
     )
     return found, remarks
+
+
+def film_scene(scene: ShotScene, tracked: Tracked) -> ShotScene:
+    """Return ``scene`` as the camera of the shot's exposure sheet sees it, if it has one that is to be used."""
+    shot = tracked.stages[0].bare
+    return filmed(scene, shot.moves, shot.settings.output.size)
 
 
 def _drawing(shot: Shot, frame: int) -> int | None:

@@ -19,11 +19,14 @@ from pegbar.io.atomic import clean_leftovers
 from pegbar.io.exr import read_passes, write_exr
 from pegbar.io.frames import read_image, write_image
 from pegbar.layer.composite import Space, depth_composite, holdout_matte, visible_matte
+from pegbar.layer.reframe import reframe_coverage, reframe_picture
 from pegbar.layer.rim import rim_depth
 from pegbar.report.contact_sheet import over_paper
 from pegbar.report.depth_picture import depth_picture
+from pegbar.scene.film_view import FilmView
 from pegbar.shot.drawn import Drawn, drawn_inputs, read_drawn
 from pegbar.shot.drawn_layers import drawn_layers
+from pegbar.shot.framed import reframed
 from pegbar.shot.plan import Shot
 from pegbar.shot.record import fingerprint, forget, is_up_to_date, write_record
 
@@ -98,6 +101,7 @@ class Stage:
             index = shot.annotation_index(frame)
             depths = None if marks.depths is None else marks.depths[index].tolist()
             parts += [marks.markers[index].tolist(), depths, marks.limb_markers.tolist()]
+        parts += shot.framing(frame)
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 
 
@@ -114,7 +118,7 @@ class DepthStage(Stage):
         return [self.shot.settings.drawing]
 
     def make(self, frame: int) -> tuple[str, ...]:
-        drawn = read_drawn(self.shot, frame)
+        drawn = reframed(self.shot, frame, read_drawn(self.shot, frame))
         depth, picture, layers = (self.shot.output(key, frame) for key in ("depth", "depth_picture", "layers"))
         if depth is not None:
             write_exr(depth, {"Z": drawn.depth})
@@ -151,7 +155,7 @@ class CompositeStage(Stage):
         return [settings.drawing, settings.passes, settings.output]
 
     def make(self, frame: int) -> tuple[str, ...]:
-        drawn = read_drawn(self.shot, frame)
+        drawn, view = self.read_drawn(frame)
         beauty, depth, space = self.read_rendered(frame)
         check_passes(frame, self.inputs(frame)[-1], drawn.alpha.shape, beauty, depth)
         depth = rim_depth(beauty, depth)
@@ -168,13 +172,27 @@ class CompositeStage(Stage):
             space=target,
             dtype=np.float32 if self.shot.settings.output.is_exr else np.uint8,
         )
-        write_final(final, picture)
+        write_final(final, picture if view is None else reframe_picture(picture, view))
         if holdout is not None:
-            _write_matte(holdout, holdout_matte(drawn.alpha, drawn.depth, depth))
+            _write_matte(holdout, holdout_matte(drawn.alpha, drawn.depth, depth), view)
         if visible is not None:
             coverage = np.asarray(beauty[..., 3], np.float32) / (255 if beauty.dtype == np.uint8 else 1)
-            _write_matte(visible, visible_matte(drawn.alpha, drawn.depth, np.clip(coverage, 0, 1), depth))
+            _write_matte(visible, visible_matte(drawn.alpha, drawn.depth, np.clip(coverage, 0, 1), depth), view)
         return drawn.notes
+
+    def read_drawn(self, frame: int) -> tuple[Drawn, FilmView | None]:
+        """Read the drawing in the pixels of the passes, and how the composite of both is seen; None for as it is."""
+        assert self.shot.settings.passes is not None
+        drawn = read_drawn(self.shot, frame)
+        if self.shot.settings.passes.camera == "sheet":
+            return reframed(self.shot, frame, drawn), None
+        return drawn, self.shot.view(frame, drawn.size)
+
+    def rendered_shape(self, paper: tuple[int, ...]) -> tuple[int, ...]:
+        """Return the (H, W) that passes are to have, or a whole number of times that, for drawings of ``paper``."""
+        passes, size = self.shot.settings.passes, self.shot.settings.output.size
+        assert passes is not None
+        return paper if passes.camera == "drawn" or size is None else size[::-1]
 
     def read_rendered(self, frame: int) -> tuple[NDArray[Any], NDArray[np.float32], Space]:
         """Read the rendered passes: beauty, depth in metres, and the space of the beauty's colours."""
@@ -211,7 +229,9 @@ def check_passes(frame: int, path: Path, drawn: tuple[int, ...], beauty: NDArray
         )
 
 
-def _write_matte(path: Path, matte: NDArray[np.float32]) -> None:
+def _write_matte(path: Path, matte: NDArray[np.float32], view: FilmView | None) -> None:
+    if view is not None:
+        matte = reframe_coverage(matte, view)
     write_image(path, np.rint(matte * 255).astype(np.uint8)[..., None])
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from pegbar.errors import MissingFrameError
 from pegbar.io.annotations import read_annotations
+from pegbar.io.camera_cells import camera_moves
 from pegbar.io.exposure import Exposure
 from pegbar.io.exposure_sheet import read_exposure_sheet
 from pegbar.io.frames import read_picture
@@ -110,7 +111,7 @@ def _text(
     if annotations is not None:
         values["annotations"] = annotations.name
     elif found["dots"]:
-        values["annotations"] = "marks.json"
+        values["annotations"] = "annotation.json"
     taken = {Path(value).parent.as_posix() for value in values.values()}
     own = "depth" if "depth" not in taken else "drawing_depth"
     return f"""\
@@ -125,7 +126,7 @@ frames = {_quoted(_relative(drawings, folder))}
 {_line("labels", values)}
 {_line("annotations", values)}
 matte = "auto"               # auto, ink, unmix, fill or alpha
-# hold = 2                   # each drawing is shown for two frames
+# hold = 2                   # each drawing is shown for two frames; then take the line frames = ... above away
 # tolerance = 30             # limb colours that are scanned or antialiased
 
 # [drawing.palette]          # further colours and the limbs that they belong to
@@ -200,6 +201,10 @@ def _with_sheet(text: str, folder: Path, exposure: Path, drawings: FrameSequence
     lines = f"exposure = {_quoted(path)}\n"
     if name is not None:
         lines += f"level = {_quoted(name)}   # of {', '.join(sheet.levels)}\n"
+    if camera_moves(sheet.camera, exposure.name)[0] is not None:
+        lines += (
+            'camera = "sheet"            # its moves are made; "drawn": the drawings are seen through them already\n'
+        )
     frames = list(Exposure.of_cells(sheet.level(name), sheet.first_frame).frames)
     text = re.sub(r'(?m)^frames = ".*"$', f'frames = "{format_frames(frames).replace(" ", "")}"', text, count=1)
     return re.sub(r"(?m)^# hold = 2 .*\n", lambda _: lines, text)

@@ -36,9 +36,22 @@ class View:
     passes: Passes
     shadow: Passes | None
 
-    def whole(self) -> Passes:
-        """Return the passes of the whole picture, at their samples."""
-        return _placed(self.passes, self.window, self.size)
+    def strip(
+        self, first: int, stop: int, depth: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return beauty and depth of the picture's rows from ``first`` to before ``stop``, at their samples.
+
+        ``depth`` is the window's, with what is filled in.
+        """
+        (left, top, right, bottom), samples = self.window, self.passes.samples
+        shape = (stop - first) * samples, self.size[0] * samples
+        beauty, depths = np.zeros((*shape, 4), np.float32), np.full(shape, np.inf, np.float32)
+        low, high = max(first, top), min(stop, bottom + 1)
+        if low < high:
+            onto = np.s_[(low - first) * samples : (high - first) * samples, left * samples : (right + 1) * samples]
+            taken = np.s_[(low - top) * samples : (high - top) * samples]
+            beauty[onto], depths[onto] = self.passes.beauty[taken], depth[taken]
+        return beauty, depths
 
     def channels(self) -> dict[str, NDArray[Any]]:
         """Return the channels of an EXR file of the whole picture, at the final size."""

@@ -33,6 +33,11 @@ class SnowField:
         Share of the snow under a foot that is pressed together; the rest is pushed aside into a rim.
     repose : float
         Angle of repose in degrees: steeper slopes slide down.
+    beyond : (4,) float, optional
+        World x and z of two corners: so far snow lies beyond the grid too, as deep as at its border. It is drawn and
+        takes flakes up, and nothing presses it. None: there is none.
+    soles : (F, S, 8) float, optional
+        Capsules by frame that press it beside the characters' volumes: feet that have none. None: there are none.
     look
         Its ``color`` is fresh snow's, ``second`` that of what is pressed down.
     """
@@ -43,6 +48,8 @@ class SnowField:
     heights: Floats
     compaction: float = 0.6
     repose: float = 50.0
+    beyond: Floats | None = None
+    soles: Floats | None = None
     look: Look = field(default_factory=lambda: Look((0.86, 0.91, 0.98, 1.0), (0.5, 0.62, 0.82, 1.0)))
 
     def __post_init__(self) -> None:
@@ -54,6 +61,17 @@ class SnowField:
             raise ValueError(f"compaction: want 0 to 1, got {self.compaction}")
         if self.repose >= 90:
             raise ValueError(f"repose: want less than 90 degrees, got {self.repose}")
+        if self.beyond is not None:
+            object.__setattr__(self, "beyond", arrays.floats("beyond", self.beyond, (4,)))
+        if self.soles is not None:
+            object.__setattr__(self, "soles", arrays.floats("soles", self.soles, ("F", "S", 8)))
+
+    @property
+    def border(self) -> NDArray[np.bool_]:
+        """Which nodes (rows, columns) are the grid's outermost."""
+        rim = np.ones(self.heights.shape, bool)
+        rim[1:-1, 1:-1] = False
+        return rim
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,9 @@ from pegbar.simulate.yarn import Yarn, direction, disc, exit_way, forward, hangi
 Floats = NDArray[np.float64]
 #: From a balloon's middle to its knot, in radii.
 KNOT = 1.14
+#: How far the strands of a tuft part, and how far it sinks where it grows sideways, as shares of its direction.
+SPLAY, SINKING = 0.25, 0.6
+UP = np.array([0.0, 1.0, 0.0])
 #: Linear RGBA: red, yellow, blue, green, violet, orange.
 BALLOONS = (
     (0.75, 0.03, 0.04, 1.0),
@@ -205,7 +208,7 @@ class Tuft(Yarn):
     second: Color = (0.16, 0.06, 0.025, 1.0)
     thickness: float = 0.004
     density: float = 100.0
-    stiffness: float = 0.3
+    stiffness: float = 0.12
     damping: float = 1.0
     at: str = "head"
     side: str = "back"
@@ -231,7 +234,7 @@ class Tuft(Yarn):
         beside = places[:, :1] * across + places[:, 1:] * np.cross(way, across)
         roots = joint + self.width * height / 2 * beside
         roots += (exit_way(roots, way, capsules_of(character, 0), height) + radius)[:, None] * way
-        ways = way + 0.35 * beside
+        ways = way + SPLAY * beside - (SINKING * UP if abs(way[1]) < 0.9 else 0.0)
         ways /= np.linalg.norm(ways, axis=1, keepdims=True)
         lengths = length * (1 - self.spread * rng.uniform(0, 1, self.count))
         out = np.linspace(0, 1, links + 1) * lengths[:, None]

@@ -87,11 +87,11 @@ class _Everything:
     def begin(self) -> None:
         """Press the first pose into the snow, still the water, fill the air."""
         for snow in self.snow:
-            snow.advance(self.held)
+            snow.advance(self.held, 0, 0)
         for puddle in self.puddles:
             puddle.settle(self.held)
         for run in self.runs:
-            run.fill(self._beds())
+            run.fill(self._beds(), self._level())
 
     def take_up(self, cache: Cache, frame: int) -> None:
         """Begin with the states after ``frame``."""
@@ -114,13 +114,13 @@ class _Everything:
         around = Around(colliders.capsules(frame - 1, frame), colliders.vertices(frame - 1))
         around.after = colliders.vertices(frame)
         for snow in self.snow:
-            snow.advance(around.capsules)
+            snow.advance(around.capsules, frame - 1, frame)
         for puddle in self.puddles:
             puddle.advance(around.capsules, self.step)
             for run in self.runs:
                 if run.element.name == puddle.element.drops:
                     run.throw(*splash(puddle, run.chance(frame, 1), 1 / (self.step * colliders.substeps)))
-        around.beds = self._beds()
+        around.beds, around.level = self._beds(), self._level()
         for run in self.runs:
             landed = run.advance(frame - 1, around)
             for puddle in self.puddles:
@@ -131,6 +131,10 @@ class _Everything:
     def _beds(self) -> list[Bed]:
         return [snow.bed for snow in self.snow] + [puddle.bed for puddle in self.puddles]
 
+    def _level(self) -> float:
+        """World height of snow that lies beyond its field; -inf where there is none."""
+        return max((snow.level for snow in self.snow), default=-math.inf)
+
 
 class Around:
     """What is met in one frame: capsules (S + 1, C, 8), vertices (V, 3) before and after it."""
@@ -138,6 +142,7 @@ class Around:
     def __init__(self, capsules: Floats, before: Floats) -> None:
         self.capsules, self.before, self.after = capsules, before, before
         self.beds: list[Bed] = []
+        self.level = -math.inf
 
 
 class ParticleRun:
@@ -159,7 +164,7 @@ class ParticleRun:
         later = min(rate * (material.stick * material.settle + material.splash * material.splash_life), 1e5)
         return math.ceil(1.3 * self.element.count + later) + 64
 
-    def fill(self, beds: list[Bed]) -> None:
+    def fill(self, beds: list[Bed], level: float) -> None:
         """Fill the air evenly and let it fall on the first pose, until all has come from outside."""
         element, fps = self.element, self.scene.frame_rate
         rng = self.chance(-1 << 20)
@@ -168,7 +173,7 @@ class ParticleRun:
         stream = float(np.abs(self.stream / (element.high - element.low)).max())
         frames = min(LONGEST_START / 24, 1.2 / stream if stream else 0.0) * fps
         around = Around(self.colliders.held(), self.colliders.vertices(0))
-        around.beds = beds
+        around.beds, around.level = beds, level
         for frame in range(-math.ceil(frames), 0):
             self.advance(frame, around)
 
@@ -214,7 +219,7 @@ class ParticleRun:
             ),
             around.capsules,
             (around.before, around.after, self.colliders.triangles),
-            (ground, around.beds),
+            (max(ground, around.level), around.level > ground, around.beds),
             (scene.wind.velocity, self.waves, before / scene.frame_rate),
             (self.motion, self.codes),
         )

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from pegbar import arrays
 
+Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
-PIN_KINDS = ("marker", "limb", "world")
+PIN_KINDS = ("marker", "limb", "path", "world")
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,11 +27,16 @@ class Pin:
     target: str = ""
     vertices: Integers | None = None
     character: str | None = None
+    path: Floats | None = None
 
     def __post_init__(self) -> None:
         if self.kind not in PIN_KINDS:
             raise ValueError(f"kind: want one of {', '.join(PIN_KINDS)}, got {self.kind!r}")
-        if self.kind != "world" and not self.target:
+        if (self.kind == "path") != (self.path is not None):
+            raise ValueError(f"path: want one for the kind 'path', and for no other, got {self.kind!r}")
+        if self.path is not None:
+            object.__setattr__(self, "path", arrays.floats("path", self.path, ("F", 3, 4)))
+        if self.kind in ("marker", "limb") and not self.target:
             raise ValueError(f"target: a pin to a {self.kind} wants its name")
         if self.vertices is not None:
             object.__setattr__(self, "vertices", arrays.integers("vertices", self.vertices, ("p",), low=0))

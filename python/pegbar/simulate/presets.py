@@ -34,7 +34,7 @@ Preset = (
     | Tuft
 )
 #: Presets that ask what the cameras see.
-SEEN = (Clothesline, Snow, Rain)
+SEEN = (Clothesline, Snow, Rain, LyingSnow)
 PRESETS: Mapping[str, type[Preset]] = {
     "scarves": Scarves,
     "skirt": Skirt,

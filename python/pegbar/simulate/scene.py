@@ -174,7 +174,9 @@ class SimulationScene:
         return index + (BARE if isinstance(self.elements[index - 1], Particles) else 0)
 
     def _check_pin(self, element: str, pin: Pin) -> None:
-        if pin.kind == "world":
+        if pin.path is not None and len(pin.path) != self.frames:
+            raise ValueError(f"pins: {element}: path: want {self.frames} frames, got {len(pin.path)}")
+        if pin.kind in ("world", "path"):
             return
         try:
             character = self.character(pin.character)

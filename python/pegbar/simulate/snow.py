@@ -54,11 +54,18 @@ class SnowRun:
         origin = (float(self.element.origin[0]), float(self.element.origin[1]))
         return origin, self.element.spacing, True, np.ascontiguousarray(self.ground + self.heights)
 
-    def advance(self, capsules: Floats) -> None:
-        """Let the capsules of a frame's substeps (S + 1, C, 8) press; then slide."""
+    @property
+    def level(self) -> float:
+        """World height of the snow beyond the grid; -inf where there is none."""
+        border = float(self.heights[self.element.border].mean())
+        return -math.inf if self.element.beyond is None else self.ground + border
+
+    def advance(self, capsules: Floats, before: int, after: int) -> None:
+        """Let the capsules of the substeps (S + 1, C, 8) from frame ``before`` to ``after`` press; then slide."""
         touched = np.zeros(self.heights.shape, bool)
-        for rows in capsules[1:]:
-            touched |= self._press(rows)
+        shares = np.linspace(0, 1, len(capsules))
+        for rows, share in zip(capsules[1:], shares[1:], strict=True):
+            touched |= self._press(np.concatenate([rows, self._soles(before, after, float(share))]))
         if touched.any():
             self._slide(touched)
 
@@ -79,21 +86,27 @@ class SnowRun:
                 np.add.at(fallen, (first[:, 0] + i, first[:, 1] + j), part * depth)
         self.heights += gaussian_filter(fallen, FLAKE, mode="reflect")
 
+    def _soles(self, before: int, after: int, share: float) -> Floats:
+        """The soles (S, 8) between two frames."""
+        if self.element.soles is None:
+            return np.empty((0, 8))
+        between: Floats = (1 - share) * self.element.soles[before] + share * self.element.soles[after]
+        return between
+
     def _press(self, rows: Floats) -> NDArray[np.bool_]:
         """Take the snow out of the capsules; return where they touch it."""
-        under = np.full(self.heights.shape, np.inf)
-        for part, lower, _ in undersides(rows, self.x, self.z, self.ground + float(self.heights.max())):
-            under[part] = np.minimum(under[part], lower - self.ground)
-        lowest = np.maximum(under, self.hard)
+        found = undersides(rows, self.x, self.z, self.ground + float(self.heights.max()))
+        lowest = np.full(self.heights.shape, np.inf)
+        for part, lower, _ in found:
+            lowest[part] = np.minimum(lowest[part], np.maximum(lower - self.ground, self.hard[part]))
         touched: NDArray[np.bool_] = self.heights > lowest
         if not touched.any():
             return touched
-        removed = np.where(touched, self.heights - lowest, 0)
-        self.heights -= removed
-        self.pressed += self.element.compaction * removed
-        aside = (1 - self.element.compaction) * removed
         part = _around(touched, MARGIN)
-        self.heights[part] += _aside(aside[part], touched[part])
+        here = touched[part]
+        removed = np.where(here, self.heights[part] - lowest[part], 0)
+        self.heights[part] += _aside((1 - self.element.compaction) * removed, here) - removed
+        self.pressed[part] += self.element.compaction * removed
         return touched
 
     def _slide(self, touched: NDArray[np.bool_]) -> None:

@@ -81,6 +81,9 @@ def pin_track(scene: SimulationScene, pin: Pin, vertices: Floats) -> Floats:
     """Return where ``pin`` holds ``vertices`` (p, 3), given before the first frame, in every frame: (F, p, 3)."""
     if pin.kind == "world":
         return np.repeat(vertices[None], scene.frames, axis=0)
+    if pin.path is not None:
+        led: Floats = vertices @ pin.path[..., :3].transpose(0, 2, 1) + pin.path[:, None, :, 3]
+        return led
     character = scene.character(pin.character)
     if pin.kind == "marker":
         marker = filled(character.markers[:, character.marker_names.index(pin.target)])
