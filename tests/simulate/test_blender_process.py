@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import os
+import queue
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import IO
 
 import pytest
 
 from pegbar.errors import BlenderError
+from pegbar.simulate.blender import process
 from pegbar.simulate.blender.locate import VARIABLE, Blender, find_blender
 from pegbar.simulate.blender.process import PATIENCE_VARIABLE, run_blender
 from tests.blenders import fake_blender
@@ -118,6 +121,18 @@ def test_only_the_last_lines_are_told(tmp_path: Path) -> None:
         run(tmp_path, "for i in range(1000): print('line', i)\nsys.exit(1)")
     lines = str(caught.value).splitlines()
     assert lines[1:] == [f"  line {i}" for i in range(992, 1000)]
+
+
+def test_last_lines_that_come_late_are_not_lost(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # As on a busy machine, where it has ended before its lines are read.
+    def slow(stream: IO[bytes], lines: queue.SimpleQueue[bytes | None]) -> None:
+        time.sleep(0.8)
+        read(stream, lines)
+
+    read = process._read
+    monkeypatch.setattr(process, "_read", slow)
+    with pytest.raises(BlenderError, match=r"exit code 7; its last lines:\n  boom"):
+        run(tmp_path, "print('boom', flush=True); os._exit(7)")
 
 
 def test_silence_ends_it_and_what_it_started(tmp_path: Path) -> None:

@@ -25,6 +25,8 @@ PATIENCE = 900.0
 INSIDE = Path(__file__).parent / "inside"
 _PROGRESS, _DONE = b"pegbar:progress:", b"pegbar:done"
 _LAST_LINES, _LONGEST_LINE = 8, 4096
+# Seconds after its end in which what it wrote last is waited for.
+_LAST_WORDS = 2.0
 
 
 def run_blender(
@@ -105,15 +107,18 @@ def _listen(
     lines: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
     assert process.stdout is not None
     threading.Thread(target=_read, args=(process.stdout, lines), daemon=True).start()
-    is_done, heard = False, time.monotonic()
+    is_done, heard, ended = False, time.monotonic(), 0.0
     while True:
         try:
             line = lines.get(timeout=0.2)
         except queue.Empty:
-            # Where a process that it started still holds the pipe, its own end is the end.
+            now = time.monotonic()
             if process.poll() is not None:
-                return is_done
-            if time.monotonic() - heard > patience:
+                # Its last lines may still come; but a process that it started may hold the pipe for ever.
+                ended = ended or now
+                if now - ended > _LAST_WORDS:
+                    return is_done
+            elif now - heard > patience:
                 return None
             continue
         if line is None:
