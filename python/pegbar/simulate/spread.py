@@ -55,7 +55,7 @@ class Spread:
         for share in shares:
             place = share / 100 * (self.count - 1)
             below, above = (self._ranked(int(rank), ends) for rank in (np.floor(place), np.ceil(place)))
-            found.append(below + (place - np.floor(place)) * (above - below))
+            found.append(float(below + (place - np.floor(place)) * (above - below)))
         return found
 
     def _ranked(self, rank: int, ends: NDArray[np.int64]) -> float:
