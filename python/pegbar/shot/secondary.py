@@ -27,7 +27,7 @@ from pegbar.simulate.materials import Wind
 from pegbar.simulate.presets import check_preset, preset_elements
 from pegbar.simulate.scene import Character, PreRoll, SimulationScene
 
-VERSION = 1
+VERSION = 2
 # Fields that change how an element looks and not how it moves.
 _LOOKS = {"color", "second", "pattern", "pattern_size", "colors"}
 
