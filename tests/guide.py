@@ -75,7 +75,7 @@ def run(block: Block, folder: Path) -> bool:
         exec(compile("\n" * block.line + block.text, str(block.page), "exec"), {"__name__": "guide"})
     elif block.language == "sh":
         if "pegbar init my_shot" in block.text:
-            (folder / "my_shot/shot.toml").unlink(missing_ok=True)
+            new_shot(folder, dotted="pegbar dots" in block.page.read_text(encoding="utf-8"))
         for command in commands(block.text, folder):
             assert command[0] == "pegbar", f"{block}: only pegbar is run here; mark the block: {command}"
             assert call(command) == 0, f"{block}: {shlex.join(command)}"
@@ -101,8 +101,11 @@ def call(command: list[str]) -> int:
 def fill_in(shot: Path) -> None:
     """Do what the guide tells users to do with a new shot file: name colours, and what is to be simulated."""
     text = shot.read_text(encoding="utf-8")
-    sample = tomllib.loads((shot.parents[1] / "demo/dots.toml").read_text(encoding="utf-8"))
-    dots, palette = sample["dots"], sample["drawing"]["palette"]
+    demo = shot.parents[1] / "demo"
+    dots = tomllib.loads((demo / "dots.toml").read_text(encoding="utf-8"))["dots"]
+    # Limbs of dots are not called as those of the marks that come with the demo.
+    named = demo / ("shot.toml" if (shot.parent / "annotation.json").exists() else "dots.toml")
+    palette = tomllib.loads(named.read_text(encoding="utf-8"))["drawing"]["palette"]
     for color, joint in dots["joints"].items():
         assert text.count(f'# "{color}" = "?"') == 1, color
         text = text.replace(f'# "{color}" = "?"', f'"{color}" = "{joint}"')
@@ -142,16 +145,24 @@ def commands(text: str, folder: Path) -> Iterator[list[str]]:
                 yield words
 
 
+def new_shot(folder: Path, *, dotted: bool) -> None:
+    """Make ``my_shot`` anew as an artist has it at first: with marks, or ``dotted`` and without."""
+    demo, shot = folder / "demo", folder / "my_shot"
+    if shot.exists():
+        shutil.rmtree(shot)
+    for name in ("drawings", "dots", "labels", "passes"):
+        shutil.copytree(demo / name, shot / name)
+    for name in ("clip.bvh",) if dotted else ("annotation.json", "clip.bvh"):
+        shutil.copy2(demo / name, shot)
+
+
 def make_workshop(folder: Path, data: Path) -> None:
     """Put into ``folder`` what the guide's commands name, given the finished demo in ``folder/demo``.
 
-    ``my_shot`` is what an artist has at first; clips and a painted character come from the real ``data``.
+    Clips and a painted character come from the real ``data``.
     """
     demo = folder / "demo"
-    for name in ("drawings", "dots", "labels", "passes"):
-        shutil.copytree(demo / name, folder / "my_shot" / name)
-    for name in ("annotation.json", "clip.bvh"):
-        shutil.copy2(demo / name, folder / "my_shot")
+    new_shot(folder, dotted=False)
     shutil.copy2(demo / "shot.toml", folder)
     for name in ("walk.bvh", "wave.bvh", "mocap/dance.bvh", "clips/walk.bvh"):
         (folder / name).parent.mkdir(exist_ok=True)

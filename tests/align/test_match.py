@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 from pegbar import Clip, OrthographicCamera, match_clips, pose_descriptor, pose_distance
 from pegbar.align.marks import EXCHANGED, read_marks
 from pegbar.align.sides import mirror
+from pegbar.sample.dancer import dance
 from pegbar.scene.body import MARKERS
 from tests.dancers import RATE, apart, covered, dance_clip, drawn, standstill, turned
 
@@ -99,6 +100,15 @@ def test_the_matched_markers_lie_on_the_drawing(kind):
     ]
     distance = np.diagonal(pose_distance(pose_descriptor(marks, pairs), pose_descriptor(points, pairs)))
     assert np.degrees(distance.mean()) / 2 < 3
+
+
+def test_a_clip_as_long_as_the_drawing_is_found_without_its_rate():
+    # At 12 a second the first pass likes it as well, but the drawings last longer than the clip then.
+    short = Clip.from_motion("short.bvh", dance(12).clip)
+    for azimuth in (3, 20):
+        found = best(drawn(short, 0, 12, azimuth, -2, rate=24), short, frame_rate=None)
+        assert (found.start, found.drawing_rate, found.verdict) == (0, 24, "fits")
+        assert found.stop >= 11
 
 
 def test_the_cost_is_equation_4_of_the_matched_poses():

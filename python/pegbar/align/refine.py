@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +46,17 @@ class Refiner:
         self.shares = marks.shares()
 
     def refine(self, clip: Clip, candidate: Candidate) -> Aligned | None:
-        """Return the candidate's best alignment, or None where the clip is too short about it."""
+        """Return the candidate's best alignment, or None where the clip is too short about it.
+
+        The rate that the first pass found may be one whose paths are too long for the clip here: then others are tried.
+        """
+        others = (which for which in range(len(self.marks.times)) if which != candidate.which)
+        for which in (candidate.which, *others):
+            if found := self._refine(clip, replace(candidate, which=which)):
+                return found
+        return None
+
+    def _refine(self, clip: Clip, candidate: Candidate) -> Aligned | None:
         place = self._climb(clip, candidate)
         camera = OrthographicCamera.from_angles(*place)
         times, cost = self._align(clip, candidate, camera)
