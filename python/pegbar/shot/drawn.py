@@ -29,16 +29,21 @@ SLIT = 96
 class Drawn:
     """A drawn frame: ``color`` (H, W, 3|4) uint8 straight, ``alpha`` and ``depth`` (H, W) float32, and what to note.
 
-    ``limbs`` are those that its labels show, as labels; None where there are no labels. ``labels`` (H, W) are the
-    limbs of all that is drawn.
+    ``marked`` (H, W) are the labels as they are painted, ``labels`` (H, W) the limbs of all that is drawn; None where
+    there are no labels.
     """
 
     color: NDArray[np.uint8]
     alpha: NDArray[np.float32]
     depth: NDArray[np.float32]
     notes: tuple[str, ...] = ()
-    limbs: frozenset[int] | None = None
+    marked: NDArray[np.uint8] | None = None
     labels: NDArray[np.uint8] | None = None
+
+    @property
+    def limbs(self) -> frozenset[int] | None:
+        """The labels that are painted somewhere; None where there are none. Takes longer than compositing."""
+        return None if self.marked is None else frozenset(np.flatnonzero(np.bincount(self.marked.ravel())).tolist())
 
     @property
     def size(self) -> tuple[int, int]:
@@ -85,11 +90,10 @@ def read_drawn(shot: Shot, frame: int) -> Drawn:
         layer = matte(picture, "fill", labels=labels, white_point=settings.white_point)
     if not labels.any() and layer.alpha.any():
         raise ValueError(f"frame {frame}: {path}: something is drawn, but no limb is marked in the label picture")
-    limbs = frozenset(np.flatnonzero(np.bincount(labels.ravel())).tolist())
     grown = grow_labels(labels, layer.alpha > 0, reach=settings.reach)
     ends, end_depths = limb_ends(shot, frame, grown)
     depth = limb_depth(grown, ends, end_depths, interpolation=settings.interpolation)
-    return Drawn(layer.color, layer.alpha, depth, notes, limbs, grown)
+    return Drawn(layer.color, layer.alpha, depth, notes, labels, grown)
 
 
 def limb_ends(shot: Shot, frame: int, labels: NDArray[np.uint8]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
