@@ -1,12 +1,16 @@
+import platform
 import random
+import re
 import shutil
 import signal
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from pegbar.cli.main import main
+from pegbar.io.film import write_film
 from pegbar.io.hold import BusyError, hold
 from pegbar.sample.shot import write_sample
 from tests.cli.interruptions import contents, start, wait_for
@@ -118,6 +122,25 @@ def test_a_second_run_in_a_folder_is_told_who_works_there_until_that_one_is_gone
         raise ZeroDivisionError
     with hold(tmp_path / "other"):
         pass
+
+
+def leftover(folder):
+    """What a process that is gone left half written."""
+    process = subprocess.Popen([sys.executable, "-c", ""])
+    process.wait()
+    folder.mkdir(exist_ok=True)
+    left = folder / f".preview.{process.pid}-93@{re.sub('[^A-Za-z0-9-]', '', platform.node())[:24]}.part.gif"
+    left.write_bytes(b"GIF")
+    return left
+
+
+def test_what_a_killed_run_left_is_cleared(tmp_path):
+    left = leftover(tmp_path / "lift")
+    with hold(tmp_path / "lift"):
+        assert not left.exists()
+    left = leftover(tmp_path / "films")
+    write_film(tmp_path / "films/a.gif", np.zeros((2, 4, 4, 3), np.uint8), 12)
+    assert [path.name for path in left.parent.iterdir()] == ["a.gif"]
 
 
 def test_a_second_run_of_frames_says_so_and_goes_on(shot, undisturbed, holder, capsys):

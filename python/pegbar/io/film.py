@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from pegbar import arrays
 from pegbar.io import video
 from pegbar.io.animation import write_animation
+from pegbar.io.atomic import clean_leftovers
 from pegbar.io.frames import write_image
 from pegbar.io.sequence import FrameSequence
 
@@ -60,6 +61,8 @@ def check_film(path: _Path, *, alpha: bool = False) -> None:
 def write_film(path: _Path, frames: Iterable[ArrayLike], frame_rate: float, *, alpha: bool = False) -> None:
     """Write pictures (H, W, 3|4) uint8 as ``path`` says, see `check_film`; sequences count from 1.
 
+    What killed runs left in its folder is cleared first.
+
     Raises
     ------
     ValueError
@@ -68,6 +71,7 @@ def write_film(path: _Path, frames: Iterable[ArrayLike], frame_rate: float, *, a
         When a file cannot be written.
     """
     check_film(path, alpha=alpha)
+    clean_leftovers(Path(path).parent)
     if is_sequence(path):
         sequence, shape = FrameSequence.parse(path), None
         for number, frame in enumerate(frames, 1):

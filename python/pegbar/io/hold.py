@@ -10,6 +10,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from pegbar.errors import PegbarError
+from pegbar.io.atomic import clean_leftovers
 
 try:
     import fcntl
@@ -28,7 +29,7 @@ class BusyError(PegbarError, OSError):
 
 @contextmanager
 def hold(folder: Path) -> Iterator[None]:
-    """Keep other runs out of ``folder``, which is made, until the block ends.
+    """Keep other runs out of ``folder``, which is made, until the block ends; clear what killed runs left in it.
 
     A run may hold a folder several times over. Where the file system has no locks nothing is kept out.
 
@@ -58,6 +59,7 @@ def hold(folder: Path) -> Iterator[None]:
     try:
         _lock(opened, folder)
         _held.add(place)
+        clean_leftovers(folder)
         yield
     finally:
         _held.discard(place)
