@@ -33,6 +33,13 @@ def matting(monkeypatch):
     return put
 
 
+def timers_end():
+    """Wait for timers that are cancelled or done: they end by themselves."""
+    for thread in threading.enumerate():
+        if isinstance(thread, threading.Timer):
+            thread.join(20)
+
+
 def test_a_first_use_that_compiles_is_told_before_it_is_over(matting, monkeypatch):
     told, notes = threading.Event(), []
 
@@ -50,6 +57,8 @@ def test_a_first_use_that_compiles_is_told_before_it_is_over(matting, monkeypatc
         found = figure_alpha(IMAGE, MASK, "closed form")
     finally:
         logging.getLogger("pegbar").removeHandler(listener)
+    # The note has reached the listener, and may still be on its way to what listens in the next test.
+    timers_end()
     assert found[20, 20] == 1
     (note,) = notes
     assert "at its first use it compiles, for about a minute" in note
@@ -61,10 +70,7 @@ def test_what_is_quick_says_nothing_and_leaves_nothing_running(matting, monkeypa
     before = threading.active_count()
     figure_alpha(IMAGE, MASK, "closed form")
     assert caplog.text == ""
-    # A timer that is cancelled ends by itself.
-    for thread in threading.enumerate():
-        if isinstance(thread, threading.Timer):
-            thread.join(20)
+    timers_end()
     assert threading.active_count() <= before
 
 
